@@ -59,7 +59,7 @@ def stop_figure(
     if lean is not None:
         _lean(axes["lean"], stop.times, lean)
         _wheels(axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
-    road(axes["road"], scene, name, stop)
+    draw_path_from_above(axes["road"], scene, name, stop)
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
@@ -166,7 +166,7 @@ def _box(front: float, rear: float) -> np.ndarray:
     )
 
 
-def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
+def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     """The path from above with the vehicle's outline now and then, on its surfaces."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0

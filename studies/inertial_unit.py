@@ -21,7 +21,7 @@ from models.core.result import result as labelled
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
-from models.drift.angle_damage import UnitPaths, damage_curve, damage_errors, unit_paths
+from models.drift.angle_damage import UnitPaths, damage_errors, log_damage_over_pitch_error, unit_paths
 from models.drift.score import CHANNELS
 from models.ensemble.statistics import ERRORS_95, quantile
 from models.fatigue.damage import SLOPE
@@ -98,7 +98,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             continue
         result.every(SAVED_SPACING).save(folder / f"{engine}.nc")
         results[engine] = result
-        curves[engine] = damage_curve(result, reach, scene.file)
+        curves[engine] = log_damage_over_pitch_error(result, reach, scene.file)
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
     rows = [_row(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs]
     table = text(rows, options, tuple(curves))

@@ -76,7 +76,7 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
     f3, f4, pitch = (np.tile(result[name], 24) for name in ("f3", "f4", "pitch"))
     error = np.linspace(0.0, 0.03, len(pitch))
     wrong, true = section_forces(f3, f4, pitch + error), section_forces(f3, f4, pitch)
-    found = study.damage_errors(study.damage_curve(result, 0.1), error[None, ::100])[0]
+    found = study.damage_errors(study.log_damage_over_pitch_error(result, 0.1), error[None, ::100])[0]
     ratio = np.array([pseudo_damage(wrong[name]) / pseudo_damage(true[name]) for name in CHANNELS])
     # f3x and f4x do 10 % and 115 % more damage; what is left falls as one over the number of runs
     assert 1 + found == pytest.approx(ratio, rel=0.01)
@@ -85,7 +85,7 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
 
 def test_the_curve_between_its_nodes_is_a_count_of_damage():
     result = simulate(scene(), "reference")
-    curve, true = study.damage_curve(result, 0.3), np.array(damages(result, 0.0))
+    curve, true = study.log_damage_over_pitch_error(result, 0.3), np.array(damages(result, 0.0))
     for angle in (-0.21, -0.004, 3e-4, 0.017, 0.12):
         # a spline of 41 nodes over a count that is smooth but for cycles that change their partner
         assert np.exp(curve(angle)) == pytest.approx(np.array(damages(result, angle)) / true, rel=0.01)

@@ -7,7 +7,8 @@ import pytest
 
 from models.multibody.numbers import GRAVITY, Handling, Tyres
 from models.systems.handling.run import build
-from models.vehicles.spatial_linear import Kinematics, preloads
+from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial_linear import preloads
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")

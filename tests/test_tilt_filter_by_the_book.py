@@ -5,7 +5,7 @@ import pytest
 
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _level_line, estimate, pulled
+from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _without_slope, estimate, pulled
 from models.systems.hub_forces.tilt_march import Noise, march
 from models.vehicles.cut_vehicle import rigid
 from validation.spatial.cars import r19
@@ -92,7 +92,7 @@ def test_biases_are_means_of_the_innovations_with_fewer_of_them_where_they_hang_
 
 def test_a_slope_is_taken_off_and_nothing_else():
     line = np.linspace(-1.0, 1.0, 9)
-    left = _level_line(np.column_stack([2.5 * line + line**2, -0.5 * line + 0.25]))
+    left = _without_slope(np.column_stack([2.5 * line + line**2, -0.5 * line + 0.25]))
     assert left == pytest.approx(np.column_stack([line**2, 0.25 + 0.0 * line]), abs=1e-14)
 
 

@@ -18,10 +18,10 @@ from models.systems.braking.scene import build
 from models.systems.pitch_plane.sampling import within_range
 from models.vehicles.cut_vehicle import rigid
 from models.vehicles.free_vehicle import chassis_of, spinning
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.pitch_plane import describe
 from models.vehicles.spatial import steiner
-from models.vehicles.spatial_linear import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.spatial.cars import r19
 

@@ -44,12 +44,12 @@ def drop_parts(folder: Path) -> None:
     """Remove temporary files and folders that killed processes left in a folder and its subfolders."""
     for part in list(folder.rglob(PARTIAL_NAME.format("*", "*", "*"))):
         number = part.name.rpartition(".part")[0].rpartition(".")[2]
-        if number.isdigit() and not _at_work(int(number)):
+        if number.isdigit() and not _runs_elsewhere(int(number)):
             shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
 
 
-def _at_work(process: int) -> bool:
-    """Whether a process with this number is running; True where the operating system offers no harmless query."""
+def _runs_elsewhere(process: int) -> bool:
+    """Whether another process has this number; True where the operating system offers no harmless query."""
     if os.name != "posix":
         return True
     try:

@@ -46,7 +46,7 @@ def damages(result: Result, error: float) -> list[float]:
     return [pseudo_damage(repeated(forces[name])) for name in CHANNELS]
 
 
-def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
+def log_damage_over_pitch_error(result: Result, reach: float, file: str = "") -> CubicSpline:
     """Logarithm of the ratio of the section forces' damage to the true damage, as a function of a constant pitch error
     (rad).
 

@@ -21,9 +21,10 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.model import Model
 from models.engines.protocol import guard
 from models.engines.stability import GROWTH, growth, limit
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
-from models.vehicles.spatial_linear import Kinematics, linearise, outputs, wheels
+from models.vehicles.spatial_linear import linearise, outputs, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
 """What each engine calls the classical Runge-Kutta method."""

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.vehicles.kinematics import UNIT, End
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, SpatialVehicle, SpringDamper, Vector
-from models.vehicles.spatial_linear import UNIT, End, preloads
+from models.vehicles.spatial_linear import preloads
 
 
 @dataclass

@@ -16,9 +16,10 @@ from models.ride.copies_kernel import POWERS, Curves, Laws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
-from models.vehicles.spatial_linear import Gains, Kinematics, linearise, preloads
+from models.vehicles.spatial_linear import Gains, linearise, preloads
 
 LARGEST_RATE_TIMES_STEP, STEEPEST = 0.25, 0.5
 """Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.

@@ -13,8 +13,9 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
-from models.vehicles.spatial_linear import Kinematics, mass, preloads, slopes_at_rest, static_stiffness
+from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest, static_stiffness
 
 GRAVITY = 9.81
 MASS = 30.0, 60e3

@@ -2,19 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import null_space
 
 from models.core.errors import InputError
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import (
-    FREEDOMS,
-    PARALLEL,
     AntiRollBar,
-    Body,
     JointElement,
     Limits,
     PartOutput,
@@ -23,117 +20,12 @@ from models.vehicles.spatial import (
     SpatialVehicle,
     SpringDamper,
     TurnOutput,
-    Vector,
 )
 
 NEGLIGIBLE_TRAVEL = 1e-10
 """Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
-End = tuple[str | None, Vector]
-"""A body, None for the ground, and a point (m) that is fixed to it, in the design position."""
-
-
-UNIT = np.eye(3)
-TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
-"""(3, 3, 3): e_i x v = TURN[i] @ v."""
-
-
-class Kinematics:
-    """Displacements of a vehicle's points as functions of small coordinates, exact to second order.
-
-    A body moves by its own coordinates after those of the bodies it rides on, so that an outer turn also turns every
-    inner motion: d2p / dq_a dq_b = e_a x dp/dq_b for an outer (or the same) turn a about e_a, 0 for an outer shift.
-    """
-
-    def __init__(self, vehicle: SpatialVehicle) -> None:
-        _check_parallel(vehicle)
-        self._bodies = {body.name: body for body in vehicle.bodies}
-        self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
-        self.size = len(self._index)
-        bodies = ((body.name, body.parent, body.position, body.freedoms) for body in vehicle.bodies)
-        self._shifts = _shifts_of(tuple(bodies))
-
-    def coordinate(self, body: str, freedom: str) -> np.ndarray:
-        """Row (n,) that selects one coordinate from q; zeros if the body does not have it."""
-        row = np.zeros(self.size)
-        if (body, freedom) in self._index:
-            row[self._index[body, freedom]] = 1.0  # type: ignore[index]
-        return row
-
-    def shift(self, body: str | None, point: Vector) -> np.ndarray:
-        """Displacement (3, n) of a point (m) per coordinate, read-only; zeros on the ground, None."""
-        x, y, z = point
-        place = body, (x, y, z)
-        if place not in self._shifts:
-            self._shifts[place] = self._shift_of(*place)
-            self._shifts[place].flags.writeable = False
-        return self._shifts[place]
-
-    def _shift_of(self, body: str | None, point: Vector) -> np.ndarray:
-        columns = np.zeros((3, self.size))
-        for rider, freedom, i in self._motions(body):
-            along = FREEDOMS.index(freedom)
-            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
-        return columns
-
-    def turn(self, body: str) -> np.ndarray:
-        """Small rotation (3, n) of a body (rad) per coordinate."""
-        columns = np.zeros((3, self.size))
-        for _, freedom, i in self._motions(body):
-            along = FREEDOMS.index(freedom)
-            if along >= 3:
-                columns[:, i] = UNIT[along - 3]
-        return columns
-
-    def bend(self, body: str | None, point: Vector) -> np.ndarray:
-        """Second derivatives (3, n, n) of a point's displacement (m) with respect to the coordinates."""
-        first = self.shift(body, point)
-        second = np.zeros((3, self.size, self.size))
-        motions = self._motions(body)
-        for k, (_, freedom, outer) in enumerate(motions):
-            along = FREEDOMS.index(freedom)
-            if along >= 3:
-                for _, _, inner in motions[k:]:
-                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
-        return second
-
-    def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
-        """Change (3, n) of an axis fixed in a body, per coordinate; zeros for the space, None."""
-        return np.zeros((3, self.size)) if frame is None else -np.tensordot(axis, TURN, 1) @ self.turn(frame)
-
-    def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
-        """Second derivatives (n, n) of axis . (point two - point one); axis fixed in ``frame``, a body or space."""
-        ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
-        total = np.tensordot(axis, second, 1)
-        if frame is None:
-            return total
-        mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
-        beyond = x + axis[0], y + axis[1], z + axis[2]
-        bent = self.bend(frame, beyond) - self.bend(frame, (x, y, z))
-        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], first[1]), bent, 1))
-
-    def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
-        """Coordinates that move a body, from the ground outwards: (body that has the coordinate, freedom, index)."""
-        if body is None:
-            return []
-        rider = self._bodies[body]
-        coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
-        return self._motions(rider.parent) + coordinates
-
-
-@lru_cache(maxsize=16)
-def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[End, np.ndarray]:
-    """Cache of points' displacements (3, n), shared by all vehicles with the same ``bodies``: name, parent, position
-    and freedoms."""
-    return {}
-
-
-def _check_parallel(vehicle: SpatialVehicle) -> None:
-    """InputError for features of the vehicle that the linear equations do not support."""
-    turned = next((body.name for body in vehicle.bodies if body.axes != PARALLEL), None)
-    if turned is not None:
-        raise InputError(vehicle.name, f"bodies[{turned}].axes", None, "must be parallel to the vehicle's axes")
 
 
 def linearise(

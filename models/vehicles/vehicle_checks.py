@@ -5,8 +5,9 @@ from collections import defaultdict
 import numpy as np
 
 from models.core.errors import InputError
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import Kinematics, mass
+from models.vehicles.spatial_linear import mass
 
 GROUND = "the ground"
 

@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         *_symmetry_rows(),
         *_refinement_rows(refined),
     ]
-    sample, sample_rows = _sample(quick)
+    sample, sample_rows = _rows_of_contact_sample(quick)
     rows += [] if quick else [_converged_row()]
     return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
 
@@ -275,7 +275,7 @@ def _converged_row() -> Row:
     )
 
 
-def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
+def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     """Every row of the other program's sample that this folder of data holds, and the worst difference."""
     words = "largest difference from the forces of CONTACT's sample (40 cells, error 0.6 %) over mu N"
     folder = data_folder()

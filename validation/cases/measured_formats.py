@@ -148,7 +148,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
 
 
 def two_rates(path: Path, extension: str) -> Row:
-    """Two groups of different rates in one file."""
+    """Largest change of times and values of two groups with different rates, written to one file and read back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
         path,

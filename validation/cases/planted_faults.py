@@ -23,7 +23,7 @@ from validation.faults import (
     written,
 )
 from validation.faults.campaign import SYSTEM
-from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
+from validation.faults.planting import CLEAN, DESCRIPTION_FAULTS, EQUATIONS_FAULTS
 
 TITLE = "Planted faults: what each check sees"
 CAMPAIGNS = (
@@ -40,7 +40,7 @@ CAMPAIGNS = (
     choosing.CAMPAIGN,
     advice.CAMPAIGN,
 )
-FEW = (DESCRIPTION[0], EQUATIONS[0])
+FEW = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
 QUICK_SPACING, FEWEST_FAULTS = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
 

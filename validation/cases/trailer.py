@@ -11,13 +11,13 @@ from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
 from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
-from validation.spatial.trains import caravan, loose_train, train
+from validation.spatial.trains import caravan, train, train_without_tie
 from validation.spatial.written_equations import TURN
 
 TITLE = "A car with a trailer on its suspension"
 SYSTEM: System = "rolling-vehicle"
 TRAINS = {"caravan": caravan, "train": train}
-STEADY_TRAINS = {"caravan": caravan, "train": loose_train}
+STEADY_TRAINS = {"caravan": caravan, "train": train_without_tie}
 SPEED, TURNING = 22.0, 15.0
 TURN_BOUND = 1e-3
 

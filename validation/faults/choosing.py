@@ -46,16 +46,18 @@ def _run() -> ChoiceQuestion:
 def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
     """The linear scene's choice by the functions that are in place now, its changes (quantities,) by frequency, and its
     largest change nearby."""
-    return _linear_by(LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted)
+    return _linear_choice_with_functions(
+        LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted
+    )
 
 
 def _by_runs() -> JudgedByRuns:
     """The choice by runs for the half car."""
-    return _runs_by(Chooser.__init__, Chooser.confirm, Screen.shares)
+    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.shares)
 
 
 @cache
-def _linear_by(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
+def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
     chooser = asked_speeds(_linear())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWS, DRAWS) * chooser.tolerance
@@ -63,7 +65,7 @@ def _linear_by(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
 
 
 @cache
-def _runs_by(*functions: Any) -> JudgedByRuns:
+def _choice_with_functions(*functions: Any) -> JudgedByRuns:
     return judged_of(_run(), "pitch-plane", "reference")
 
 

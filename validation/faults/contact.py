@@ -98,7 +98,7 @@ def _stuck() -> Array:
     return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
 
 
-def _exact_linear() -> float:
+def _exact_against_linear() -> float:
     """Exact theory under small creepages against the linear one."""
     exact = rolling_problem.solve_rolling(_normal_solution(), MU, 2e-5, 1e-5, 0.0, PAIR)
     return largest_relative_difference(np.array([exact.fx, exact.fy]), _stuck())
@@ -111,7 +111,7 @@ CHECKS = {
     "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _published),
     "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _against_linear_theory),
     "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding),
-    "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_linear),
+    "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_against_linear),
     "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theories),
 }
 

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 from validation.common.rows import Drawn, Observed, Row, Saved, Table
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
-from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, EngineFault, planted
+from validation.faults.planting import (
+    ADAPTER_FAULTS,
+    CLEAN,
+    DESCRIPTION_FAULTS,
+    EQUATIONS_FAULTS,
+    FAULTS,
+    INPUT_FAULTS,
+    EngineFault,
+    planted,
+)
 
 TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
 DURATION = 0.1
@@ -52,7 +61,12 @@ def _ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | 
     return ratio if math.isfinite(ratio) else None
 
 
-PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
+PLACES = {
+    "description": DESCRIPTION_FAULTS,
+    "input": INPUT_FAULTS,
+    "adapter": ADAPTER_FAULTS,
+    "equations": EQUATIONS_FAULTS,
+}
 
 
 def seen(record: Saved, check: str, vehicle: str = TWIN) -> bool:

@@ -84,7 +84,7 @@ CLEAN = (
     EngineFault("no fault, equations interpreted", HAND, inside=rewritten()),
 )
 
-DESCRIPTION = (
+DESCRIPTION_FAULTS = (
     EngineFault("a and b swapped", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
     EngineFault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
     EngineFault("front and rear suspension swapped", BOTH_ENGINES, change.swapped("suspension3", "suspension4")),
@@ -110,7 +110,7 @@ DESCRIPTION = (
 )
 """In the description that an engine is built from."""
 
-INPUT = (
+INPUT_FAULTS = (
     EngineFault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
     EngineFault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
     EngineFault("road held at the middle stages", BOTH_ENGINES, change.driven(("road",), change.HeldStages)),
@@ -145,7 +145,7 @@ INPUT = (
 )
 """In the input or the settings that an engine is run with."""
 
-ADAPTER = (
+ADAPTER_FAULTS = (
     EngineFault(
         "held sample of the step's end",
         EXUDYN,
@@ -187,7 +187,7 @@ ADAPTER = (
 )
 """In the code of an engine's adapter."""
 
-EQUATIONS = (
+EQUATIONS_FAULTS = (
     EngineFault("cos(pitch) missing in the moment", HAND, inside=rewritten(newton_euler=patches.moment_without_cosine)),
     EngineFault("cos(pitch) missing in the damper", HAND, inside=rewritten(suspension=patches.damper_without_cosine)),
     EngineFault("forces from the state before", HAND, inside=rewritten(suspension=patches.stale_state)),
@@ -195,4 +195,4 @@ EQUATIONS = (
 )
 """In the hand-written equations."""
 
-FAULTS = (*DESCRIPTION, *INPUT, *ADAPTER, *EQUATIONS)
+FAULTS = (*DESCRIPTION_FAULTS, *INPUT_FAULTS, *ADAPTER_FAULTS, *EQUATIONS_FAULTS)

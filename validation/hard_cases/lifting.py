@@ -27,7 +27,7 @@ from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
-from models.vehicles.spatial_linear import Kinematics
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.bounces import Bounces, energy
 from validation.hard_cases import setups

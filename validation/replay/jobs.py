@@ -68,10 +68,12 @@ def _bases() -> Iterator[ReplayJob]:
         scene = tomllib.loads(base.read_text())
         engines = scene.pop("engines_asked", ENGINES)
         for engine in engines or ("",):
-            yield ReplayJob(f"{base.stem}-{engine or 'plain'}", (("show", "scene.toml"), _run(engine)), dumps(scene))
+            yield ReplayJob(
+                f"{base.stem}-{engine or 'plain'}", (("show", "scene.toml"), _run_command(engine)), dumps(scene)
+            )
 
 
-def _run(engine: str) -> tuple[str, ...]:
+def _run_command(engine: str) -> tuple[str, ...]:
     return ("run", "scene.toml", *(("--engine", engine) if engine else ()), "--json", "--out", "out")
 
 
@@ -95,7 +97,7 @@ def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJ
             _change(scene, str(place), float(random.uniform(*FACTORS)))
     if random.random() < MISTAKE_CHANCE:
         engine = _mistake(scene, engine, random)
-    return ReplayJob(name, (_run(engine),), dumps(scene))
+    return ReplayJob(name, (_run_command(engine),), dumps(scene))
 
 
 def _drop(scene: Table, random: np.random.Generator) -> None:

@@ -57,7 +57,7 @@ def train() -> SpatialVehicle:
     )
 
 
-def loose_train() -> SpatialVehicle:
+def train_without_tie() -> SpatialVehicle:
     """The train without the tie, whose box pitches on the drawbar, too: no moment crosses a hitch.
 
     Closed forms of a turn know none. A box that cannot pitch beside a drawbar that rolls with the car yaws by its

@@ -12,8 +12,9 @@ import numpy as np
 
 from models.advice.ride_choice.reduced import FullScene
 from models.ride.covariance import stationary
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import FREEDOMS
-from models.vehicles.spatial_linear import Kinematics, slopes_at_rest
+from models.vehicles.spatial_linear import slopes_at_rest
 
 
 def activity(full_scene: FullScene) -> dict[str, float]:

@@ -42,7 +42,7 @@ class Channels:
         self._block, self._noise = -1, np.zeros((0, count))
 
     def __call__(self, number: int, values: np.ndarray) -> np.ndarray:
-        """The values (count,) of a sample after delay, noise and resolution of their sensors."""
+        """Values (count,) of one sample after gain, offset, noise and rounding of their sensors."""
         conversion = self.conversion
         if conversion.gain != 1.0 or conversion.offset != 0.0:
             values = conversion.gain * values + conversion.offset

@@ -13,7 +13,7 @@ from models.measured.signal import Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
-from models.vehicles.spatial_linear import Kinematics
+from models.vehicles.kinematics import Kinematics
 
 STEP = 1e-3
 NUDGE = 1e-5

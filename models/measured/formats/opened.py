@@ -70,7 +70,10 @@ class Opened(ABC):
                 yield SampleBlock(first, times, values)
 
     def _finite(self, first: int, names: list[str], values: np.ndarray, valid: np.ndarray) -> None:
-        """Refuse the first value that is infinite and so cannot be measured."""
+        """Refuse the first value that is not valid: infinite, or a time that is not finite.
+
+        NaN in a channel means that nothing was measured.
+        """
         if not valid.all():
             row, column = (int(i[0]) for i in np.nonzero(~valid))
             place = f"channel {names[column]!r}, sample {first + row}"

@@ -42,7 +42,7 @@ TIMES = 3.0
 """By which factor a load may be above that of friction which is known at one load only."""
 FULL_CIRCLE = 1.5
 """rad: tables that go on to here know every slip angle."""
-CORNERING = 1e-3
+LEAST_SLIP_ANGLE = 1e-3
 """rad of slip angle: below, tyres have no side force to mistake."""
 
 
@@ -243,7 +243,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
     lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
     least = vehicle.slope * lively * vehicle.sample / vehicle.substeps
     angles = np.nanmax(np.nan_to_num(np.abs(run["slip_angle"])), axis=1)
-    return {"vehicle": np.where((angles > CORNERING) & (Stop(run.detail).speed < least), least, np.nan)}
+    return {"vehicle": np.where((angles > LEAST_SLIP_ANGLE) & (Stop(run.detail).speed < least), least, np.nan)}
 
 
 def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator[Assumption]:

@@ -168,7 +168,7 @@ class TiltFilter:
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
             allowed = self.noise.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
-            left = np.var(_level_line(measured - integral), axis=0)
+            left = np.var(_without_slope(measured - integral), axis=0)
             self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
@@ -200,8 +200,8 @@ def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
             raise InputError(file, name, None, f"hold what is no number in sample {row} of this stretch")
 
 
-def _level_line(values: np.ndarray) -> np.ndarray:
-    """Values (n, k) without the linear trend of each column."""
+def _without_slope(values: np.ndarray) -> np.ndarray:
+    """Values (n, k) without the linear trend of each column; the means stay."""
     line = np.linspace(-1.0, 1.0, len(values))
     return values - np.outer(line, line @ values / (line @ line))
 

@@ -14,8 +14,9 @@ from models.core.assumptions import Assumption, Gaussian, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import AXES, GRAVITY, WatchedMotion, static_loads
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import NO_LIMITS, Curve, SpatialVehicle, SpringDamper
-from models.vehicles.spatial_linear import Kinematics, linearise
+from models.vehicles.spatial_linear import linearise
 
 SMALL = 0.3
 """rad: where sines are taken for angles they may be so large: 1.5 % of the sine."""

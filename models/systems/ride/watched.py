@@ -14,9 +14,10 @@ from models.core.errors import InputError
 from models.ride.sweep import sweep
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import GRAVITY, Linear
+from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, Output
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
-from models.vehicles.spatial_linear import Kinematics, linearise, outputs, preloads
+from models.vehicles.spatial_linear import linearise, outputs, preloads
 
 AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
 FEW = 5
