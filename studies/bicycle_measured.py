@@ -25,8 +25,9 @@ FEEDBACK = Control(gain=2.0, until=6.5)
 
 @dataclass(frozen=True, eq=False)
 class BicycleObservations:
-    """Observations of all speeds; the choice on some of them; predictions by it of the speeds that took no part, and of
-    each speed by a choice on all others, where none was asked to stand aside: (mean (2,), deviations (2,)) by speed."""
+    """Measured weave at all speeds, the suspects that were chosen, and predicted weave. A prediction, by speed, is a
+    mean (2,) and standard deviations (2,). It is made for each speed that was not used in the choice; if all were used,
+    each speed is predicted by a choice on all the others."""
 
     seen: list[Observation]
     choice: Choice

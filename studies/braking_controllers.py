@@ -56,7 +56,8 @@ LABELS = ("surface", "procedure", "controller")
 
 
 def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
-    """All runs by their labels, surface by surface: the scene of each alone."""
+    """The scene of every single run: for each surface, all procedures, each with every controller and, if there is a
+    trailer, without and with it. Keys: surface, procedure, label of the controller."""
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
     return {

@@ -40,8 +40,8 @@ OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 def stop_figure(
     scene: BrakingScene, name: str, results: Results, file: File, measured_pressures: MeasuredPressures | None = None
 ) -> File:
-    """Panels of the first result: speeds, slips, pressures, torques, the path; motion to the side where there is any,
-    and of a vehicle on its suspension also its body's lean, and loads."""
+    """Plot the stop of the first engine over time: speeds, slips, pressures, torques; and the path from above. Lateral
+    motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a suspension."""
     procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
     aside, lean = _moves_aside(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
@@ -84,7 +84,7 @@ SPELT = {
 
 
 def plain_name(name: str) -> str:
-    """Name of a procedure or a controller as readers write it."""
+    """Name of a procedure or controller with spaces or in its usual spelling, for titles and labels."""
     return SPELT.get(name, name.replace("_", " "))
 
 
@@ -93,7 +93,7 @@ STRAIGHT = 0.05
 
 
 def _moves_aside(stop: Stop) -> bool:
-    """Whether a vehicle turns, or is pushed, to the side."""
+    """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST
     turned = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
     return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
@@ -155,7 +155,8 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
 
 
 def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
-    """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
+    """Positions (m, 2) on the road of points that are fixed to a unit. positions (2 + U,): x, y (m) of the vehicle and
+    the yaw angles of its U units."""
     return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
@@ -167,7 +168,7 @@ def _box(front: float, rear: float) -> np.ndarray:
 
 
 def road(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
-    """The path from above with the vehicle's outline now and then, on its surfaces."""
+    """Draw the path from above on the road's surfaces, with the vehicle's outline at a few moments."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     plane, drawn = plane_of(scene), outlines(scene)

@@ -36,8 +36,9 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot be; what it saves: work
-    of the scene with longer steps alone, divided by that of what is left at the longest step that is then allowed."""
+    """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
+    saving. saved: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
+    effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
@@ -46,8 +47,9 @@ class SingleEffect:
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """A scene's choice, effects one by one, tolerances above which effects that stay would go, energy activity (W) by
-    element where it has a closed form; results of what is left, with their errors."""
+    """The choice of effects for one scene, with each effect taken alone. further: tolerances above which effects that
+    stay would be left out too. watts: energy activity (W) by element, where it has a closed form. results: runs of the
+    reduced scene, with their errors."""
 
     scene: Any
     engine: str
@@ -102,7 +104,8 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
 
 
 def _results(choices: list[SceneChoice]) -> dict[str, Result]:
-    """Results of what is left of each scene, by what tells them apart."""
+    """Results of the reduced scenes of all choices, each under a name of its system (if there are several) and run
+    number."""
     return {
         " ".join(
             (
@@ -116,7 +119,8 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
 
 
 def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Pass on what is spent of a scene's search, after some of so many scenes."""
+    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the present
+    one."""
     progress(title, (completed + share) / scene_count)
 
 
@@ -130,7 +134,8 @@ def has_closed_form(scene: Any) -> bool:
 
 
 def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
-    """The implementation that was asked for, or the system's usual one."""
+    """The system's usual engine if it is among the requested ones or none is requested; else the first requested
+    one."""
     usual: str = system_of(scene).ENGINE
     return usual if not engines or usual in engines else engines[0]
 
@@ -302,7 +307,8 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
 
 
 def misleading_activities(choice_of: SceneChoice) -> list[str]:
-    """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
+    """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
+    quantity."""
     total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
     for effect in choice_of.alone:
         share = choice_of.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
@@ -376,7 +382,8 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
 
 
 def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> str:
-    """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
+    """Name of an effect with "(left out)" or "(stays)". An effect that changes little alone may stay, since it can
+    matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
         " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"
     )

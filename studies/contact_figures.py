@@ -80,7 +80,7 @@ def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
-    """Zones of stick and slip, and an arrow of the traction on the wheel every ``spacing`` (mm)."""
+    """Draw the zones of stick and slip, and arrows of the traction on the wheel every ``spacing`` (mm)."""
     largest = friction * max(float(f.pressure.max()) for f in patches)
     scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
     for f in patches:
@@ -202,7 +202,8 @@ def price_figure(price: Result, title: str) -> Figure:
 
 
 def _priced(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
-    """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
+    """Plot the mean error (%) of one theory. An optional bar at its largest number of cells reaches up to the error
+    that 95 of 100 contacts do not exceed."""
     colour, marker = STYLES[name]
     mean, most = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"

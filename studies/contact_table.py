@@ -43,7 +43,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """Printed lines on ``rows`` rows, of which some are wrong, from the file ``name``."""
+    """Lines for the screen on how many rows of the file ``name`` were computed, how many have errors, and the time
+    taken."""
     if rows == 0:
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"

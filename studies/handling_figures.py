@@ -57,7 +57,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
 
 
 def _tyre_style(i: int) -> dict[str, Any]:
-    """Colour and line of a tyre by its number."""
+    """Line colour and line style of the tyre with this number."""
     return {"color": TYRES[i % 4], "linestyle": LINES[i // 4 % 4]}
 
 

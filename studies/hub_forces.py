@@ -95,7 +95,7 @@ def save(comparison: Comparison, folder: Path) -> None:
 
 
 def _write(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
-    """Samples of hub forces or angles, columns of these names and units."""
+    """Write sampled hub forces or angles to a CSV file, with a column for each name and unit."""
     columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
     write_time_series(path, columns, measured.period)
 

@@ -162,7 +162,8 @@ def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
 def _row(
     options: Options, grade: int, minutes: float, every_angle: np.ndarray, curves: dict[str, CubicSpline]
 ) -> dict[str, Any]:
-    """One grade over one duration: angle error by law and measured, damage error per engine."""
+    """Results for one gyro grade over one duration: angle error by the law and by measurement, and damage error per
+    engine."""
     end = round(60 * minutes)
     angles = every_angle[:, : end + 1]
     worst = {engine: np.abs(damage_errors(curve, angles)).max(axis=1) for engine, curve in curves.items()}
@@ -221,7 +222,7 @@ def _percent(share: float) -> str:
 
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
-    """Angle error and damage error over the length of the drive, a line per grade."""
+    """Plot angle error and damage error over the length of the drive, with a line for each gyro grade."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -154,7 +154,8 @@ def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: 
 
 
 def _answer(sweep: Sweep) -> dict[str, Any]:
-    """Standard deviations at all speeds in the scene's own case, SI; None where an output has none."""
+    """Standard deviation (SI) of each output at all speeds in the scene's own case; None in place of a value that is
+    not finite."""
     return {
         "speed": sweep.speeds[:-1].tolist(),
         "deviation": {
@@ -167,7 +168,8 @@ def _answer(sweep: Sweep) -> dict[str, Any]:
 def _table(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
-    """Table of each output's standard deviation at one speed, and the errors of simpler roads."""
+    """Table of each output's standard deviation at one speed, and how much it changes on roads with simpler
+    correlation."""
     (name, first), *others = sweeps.items()
     width = max(map(len, first.outputs))
     heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC))
@@ -214,8 +216,8 @@ def _change(other: float, value: float) -> str:
 
 
 def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
-    """Lines on how often each travel passes the free travel (m), and on its rate where the vehicle file asks for its
-    rate."""
+    """Lines on the share of time for which each suspension travel exceeds the free travel (m). The number of
+    exceedances per hour is added if the vehicle file has the travel rate as an output."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []
@@ -231,7 +233,7 @@ def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_trav
 
 
 def _loads(vehicle: SpatialVehicle, deviations: Mapping[str, float]) -> list[str]:
-    """Dynamic wheel load factors in a line."""
+    """Line of text with the dynamic wheel load factors."""
     parts = [
         f"{name} {dynamic_load_factor(deviations[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
         for name, load in static_loads(vehicle).items()

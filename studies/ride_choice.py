@@ -91,7 +91,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
-    """Standard deviations of the full and the reduced scene, with their errors and assumptions."""
+    """Standard deviations in the complete scene and in the reduced one, as results with their errors and
+    assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced.vehicle, limits=reduced.limits)
     if reduced != ReducedScene.complete(scene):
@@ -138,8 +139,8 @@ def _save(
     runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
-    """Save the changes by leaving out each effect alone, predicted and confirmed, and whether it was left out; a CSV of
-    these and one of the energy activity of every element beside."""
+    """Save, for each effect, the predicted and confirmed changes if it alone is left out, and whether it was left out.
+    A result and a CSV file hold these; another CSV file holds the energy activity of every element."""
     import pandas as pd
 
     results, counts = runs
@@ -208,7 +209,8 @@ def choice_figure(
 
 
 def _activity(axis: Any, watts: dict[str, float]) -> None:
-    """Plot the shares of the elements' finite watts; an inertia under white noise has none."""
+    """Bar chart of each element's share of the mean power, from the activities ``watts`` (W). Inertias under white
+    noise are left out, as their activity is not finite."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}

@@ -145,7 +145,8 @@ def _figure_measurement(measured_run: Result) -> Any:
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
-    """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
+    """Plot each run's heave error on a logarithmic scale, and its pitch; the first of the results is the
+    measurement."""
     from models.drawing.figures import COLUMN_WIDTH, TRUTH, heading, legend_below, subplots
 
     figure, (heave, pitch) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -57,7 +57,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _steps(results: Results) -> str:
-    """Text on the step error of the score: that of the measurement, whose steps all runs share."""
+    """Step error of the score as JSON text: that of the measurement, because all runs use its steps."""
     error = json.loads(next(iter(results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}

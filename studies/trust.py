@@ -123,14 +123,16 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result
 
 
 def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
-    """Pitch error of a run beside another one's pitch, so that each source of error is seen alone."""
+    """Magnitude of the difference between a run's pitch and the pitch (rad) of another run that lacks one source of
+    error."""
     return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
 
 
 def _ensemble(
     base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
 ) -> dict[str, np.ndarray]:
-    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise, ``quiet``.
+    """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
+    run without noise, ``quiet``.
 
     The errors are nan from where a path left all bounds.
     """
@@ -226,7 +228,8 @@ def _measured(row: Row) -> str:
 def _remedies(
     options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Sampling rate and noise for the wanted time, by the growth rate from the time that is predicted."""
+    """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
+    extrapolated by the growth rate of errors."""
     forces = assemble(base).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
@@ -266,7 +269,8 @@ def _figure(
     results: Results,
     path: Path,
 ) -> None:
-    """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
+    """Plot the growth of the pitch error by source on a logarithmic scale: predicted laws dashed, computed runs
+    solid."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, heading, save, subplots
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}

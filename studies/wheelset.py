@@ -105,7 +105,8 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict
 
 
 def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """Klingel's wavelength by its closed form, and how far each implementation's lies from it."""
+    """Lines on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each engine's
+    eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
     closed, first = klingel(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
     lines = [
@@ -142,7 +143,7 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
 
 
 def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
-    """Lines on how each path ends, how far the implementations differ, and where the energy goes."""
+    """Lines on how each path ends, how far the engines' paths differ, and the energy balance."""
     if not paths:
         return []
     (name, first), *others = paths.items()
@@ -166,7 +167,7 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
 
 
 def _ending(motion: Motion) -> str:
-    """Last amplitude of a path, and what a cycle makes of it."""
+    """Text on a path's last amplitude, and by how much it changed in the last cycle."""
     y = motion.states[:, Y]
     tops = y[maxima(y)]
     if tops.size < 2:

@@ -35,12 +35,14 @@ SHOWN_SECONDS = 1.0
 
 
 def _note(axis: Axes, text: str, point: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
-    """Text that ends so many points beside a place."""
+    """Write text beside a point of the plot; the text's right end is shifted from the point by ``shift`` (printer's
+    points)."""
     axis.annotate(text, point, shift, textcoords="offset points", ha="right", **style)
 
 
 def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
-    """Name and colour of each wheel, and the sums (n,) over its patches of what they report under some names."""
+    """For each wheel: its name, its colour, and a sum (n,) over its contact patches for each of the named
+    quantities."""
     each = contacts.shape[1] // 2
     yield "right wheel", BLUE, [contacts[name][:, :each].sum(axis=1) for name in names]
     yield "left wheel", VERMILION, [contacts[name][:, each:].sum(axis=1) for name in names]
@@ -169,7 +171,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 
 
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
-    """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
+    """Plot the limit cycle as yaw over lateral displacement in every engine, and its creep forces over one period."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():

@@ -31,7 +31,8 @@ HEADS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "st
 
 @dataclass(frozen=True)
 class Match:
-    """A channel of both: values (n,) at times (n,) of the run (s), in the run's unit.
+    """One channel that was both computed and measured: values of both (n,) at the same times (n,) of the run (s), in
+    the run's unit.
 
     stated : error that the run states for it, NaN where it states none.
     """
@@ -45,7 +46,7 @@ class Match:
 
     @property
     def error(self) -> np.ndarray:
-        """(n,): run less measurement."""
+        """Error (n,): value of the run minus measured value."""
         return self.run - self.measured
 
     @property
@@ -71,7 +72,7 @@ class Match:
 
     @property
     def at(self) -> float:
-        """Time (s) of the run at which that is."""
+        """Time (s) of the run at which the error is largest."""
         return float(self.times[self.row])
 
     def values(self) -> dict[str, float | None]:
@@ -82,7 +83,8 @@ class Match:
 
 @dataclass(frozen=True)
 class Overlay:
-    """A measurement over one run: its shift, the channels of both, and notes on what could not be compared."""
+    """Comparison of a measurement with one run: the time shift, the common channels, and notes on what could not be
+    compared."""
 
     shift: Shift
     matches: list[Match]
@@ -99,7 +101,7 @@ class Overlay:
         return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
 
     def told(self) -> str:
-        """A sentence on the shift."""
+        """Sentence for the screen about the time shift between measurement and run."""
         shift, alike = self.shift.seconds, self.shift.correlation
         if np.isnan(alike):
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
@@ -108,7 +110,8 @@ class Overlay:
 
 
 def _share(relative: float) -> str:
-    """Relative error of a channel; not a number for a channel that does not vary."""
+    """Relative error of a channel as a percentage in text; "-" where it is not finite, as for a constant
+    measurement."""
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
@@ -117,7 +120,7 @@ def _within_error_text(match: Match) -> str:
 
 
 def against(run: Path, measurement: Path) -> bool:
-    """Whether a comparison is of a run with a measurement: a saved result or a folder, and a file of measurements."""
+    """Whether the two paths are a run (a saved result or a folder) and a file of measurements, in this order."""
     return (
         (run.is_dir() or run.suffix == ".nc")
         and not measurement.is_dir()
@@ -155,7 +158,8 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
 
 
 def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
-    """Channels of the run that a measured channel is laid over: that of its name, or of its name in each engine."""
+    """Names of the run's channels to compare with a measured channel: the same name, or this name followed by each
+    engine's."""
     if name in ours:
         return [name]
     return [each for each in (f"{name}, {engine}" for engine in engines) if each in ours]
@@ -169,7 +173,7 @@ def _notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> 
 
 
 def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
-    """A channel of both, in the unit of the run."""
+    """Times and values of one channel in the run and in the measurement, both in the run's unit."""
     if not channel.unit and ours.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
         raise InputError(source.path, channel.name, None, allowed)
@@ -183,7 +187,8 @@ def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
 
 
 def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
-    """A channel of both at the times of the measurement that lie within the run; None where there are none."""
+    """Compare one channel at those measured times that lie within the run; None if no measured time does. The run is
+    interpolated by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     times = channel_pair.times - shift

@@ -31,7 +31,7 @@ def studies() -> tuple[str, ...]:
 
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
-    """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
+    """Load a scene by name from those that come with twinrig, or from a file whose name ends in .toml."""
     return load(scene_path(name), changes or (), KNOWN_SYSTEMS)
 
 
@@ -62,7 +62,7 @@ def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
 
 
 def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
-    """InputError for what no engine would run; what only some of them refuse, the scene's plan tells."""
+    """Raise InputError if no engine can run the scene. If only some engines refuse it, the scene's plan says so."""
     try:
         checked_study(scene, engines)
     except InputError:
@@ -108,7 +108,7 @@ def causes(scene: Any) -> list[str]:
 
 
 def _unended(scene: Any) -> Iterator[Finding]:
-    """Remarks on the CSV files that a scene names whose last line has no line end."""
+    """Notes on CSV files of a scene whose last line lacks its line end."""
     from models.core.tables import has_line_end
 
     for name in dict.fromkeys(_files(scene.table())):

@@ -55,7 +55,7 @@ def _by_share(differences: list[QuantityDifference], first: object, second: obje
 
 
 def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
-    """Notes on names that one side alone has."""
+    """Notes on names that occur in only one of the two results."""
     return [
         f"{prefix}only in {path}: {', '.join(alone)}"
         for (path, names), (_, others) in (sides, sides[::-1])
@@ -104,7 +104,8 @@ def _files(folder: Path) -> dict[str, Path]:
 
 
 def _tabled(path: Path) -> bool:
-    """Whether the CSV beside a netCDF file is the same table: its channels have one axis."""
+    """Whether a netCDF file and the CSV file of the same name hold the same table: all channels have one common
+    axis."""
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
@@ -131,7 +132,7 @@ def _quantities(path: Path) -> Iterator[tuple[str, Quantity]]:
 
 
 def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
-    """Quantities with the errors that the result of which they are states."""
+    """Quantities of a result, each with the error that the result states for its channel, if it states one."""
     errors = {} if run is None else errors_of(run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
@@ -139,7 +140,8 @@ def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]])
 
 
 def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
-    """Channels of numbers of a dataset, a quantity for each of their rows along time or another axis."""
+    """Numeric channels of a dataset as quantities over time or another axis. A channel with further axes gives one
+    quantity for each entry of these."""
     kinds = ", ".join(str(data.attrs[kind]) for kind in KINDS if kind in data.attrs)
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
@@ -301,7 +303,7 @@ def _lines(differences: list[QuantityDifference]) -> list[str]:
 
 
 def _difference_text(difference: QuantityDifference) -> str:
-    """Where a difference is largest, and whether it tells anything."""
+    """Text on where a difference is largest; it adds if the difference lies within the stated errors."""
     return (
         f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
         if difference.within

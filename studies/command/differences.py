@@ -7,7 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Quantity:
-    """values (n,) over ``grid`` (n,), which is a time, a coordinate or the first column of a table, or counts rows.
+    """Values (n,) of one quantity over ``grid`` (n,): times, another coordinate, the first column of a table, or row
+    numbers.
 
     kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
     no number; error : that the result states for its channel, in its unit, nan where it states none.
@@ -41,7 +42,8 @@ class QuantityDifference:
 
     @property
     def within(self) -> bool:
-        """Whether both results differ by less than they say that they err: then the difference tells nothing."""
+        """Whether the rms difference of both results is within the errors that they state: then it has no
+        significance."""
         return 0.0 < self.rms <= self.stated
 
     @property
@@ -54,7 +56,7 @@ class QuantityDifference:
 
     @property
     def row(self) -> int:
-        """Where the difference is largest."""
+        """Index of the row at which the difference is largest."""
         return int(np.abs(self.gap).argmax())
 
     @property

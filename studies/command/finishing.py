@@ -23,7 +23,8 @@ def exit_with_message(message: str, code: int) -> NoReturn:
 
 
 def profile_lines(profile: bool) -> Callable[[Work], Work]:
-    """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
+    """A wrapper for the work: with ``profile``, the work also reports where its computing time went; else it is
+    unchanged."""
     if not profile:
         return lambda work: work
     from studies.command.profile import Watch
@@ -78,7 +79,8 @@ def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | N
 
 
 def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
-    """Lines of those findings that a plan or a study has not told."""
+    """Lines of the findings whose text does not occur in ``told``, which is what a plan or a study has printed
+    already."""
     return lines(finding for finding in findings if finding.text not in told)
 
 

@@ -66,7 +66,8 @@ def profiles_of(
 
 
 def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float) -> dict[str, Any]:
-    """Everything that stages depend on."""
+    """Inputs on which saved stages of an identification depend: if one of them changes, the stages are computed
+    anew."""
     table = scene.table()
     return {
         "scene": table,
@@ -179,7 +180,8 @@ def lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) 
 
 
 def late_clock(uncertainty: Uncertainty) -> float:
-    """s by which the measurement seems later than the model; 0 unless both are ``NEARER`` as near when laid so.
+    """Delay (s) of the measurement relative to the model; 0 unless shifting by it makes the mismatch ``NEARER`` times
+    smaller.
 
     The model is that of the start: estimates take up a part of the delay.
     """

@@ -85,8 +85,8 @@ class Points:
         raise first
 
     def record(self, i: int) -> Record:
-        """Numbers of one point by their names, what failed, by engine where the study told it, and what its results say
-        of themselves."""
+        """Record of one point: its numbers by name, the failures (by engine, where the study gives them), and the
+        errors and assumptions that its results state."""
         try:
             scene, engines, study = self.ready(i)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
@@ -228,7 +228,8 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
 
 
 def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
-    """The records as columns, and what their results say."""
+    """The records of all points as one column per quantity, with the failures and with the errors and assumptions of
+    the results."""
     from studies.command.sweep_figure import Swept
 
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
@@ -239,7 +240,7 @@ def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
 
 
 def _unit(job: Points) -> str:
-    """Unit of a key of the scene, as its table states it, "-" of what has none; "SI" where no table says."""
+    """Unit of the key that is swept: "-" if its table gives it none, "SI" if no table describes the key."""
     owner: Any = load_scene(job.scene, list(job.changes))
     *tables, name = job.key.split(".")
     for table in tables:
@@ -292,18 +293,19 @@ def _save(folder: Path, swept: "Swept") -> None:
 
 
 def _largest_error(results: told.Results) -> float | None:
-    """The largest error of a point's results, by its channel's deviation; None where none was estimated."""
+    """Largest relative error among a point's results, each error divided by the standard deviation of its channel; None
+    where no error was estimated."""
     return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
 
 def _broken(results: told.Results) -> str:
-    """Assumptions that a point's results broke, with the share of the time."""
+    """Text on assumptions that a point's results broke, each with the share of the time for which it was broken."""
     breaches = [(name, breach) for name, run in results.items() for breach in broken_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
-    """The first quantities that change, from their least to their largest value."""
+    """Table of the quantities that change in the sweep, at most 12: first, last, least and largest value."""
     moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [
         f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "

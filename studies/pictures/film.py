@@ -71,7 +71,7 @@ class Strut:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Shapes of the bodies and of what stands around.
+    """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
     shapes : surfaces of each body in its own axes; rest : its place when nothing moves; magnified : how many times as
     large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is drawn as it
@@ -92,7 +92,8 @@ class Stage:
 
 
 def gaps(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
-    """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
+    """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
+    forces (N)."""
     places = [(place, second.places[name]) for name, place in first.places.items()]
     turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
@@ -116,7 +117,8 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
 
 
 def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
-    """Poses at Exudyn's coordinates (f, n), in its own order; ``bodies`` answer for an output variable of Exudyn."""
+    """Poses of bodies at Exudyn's coordinates (f, n), in Exudyn's own order; each function in ``bodies`` returns a
+    body's value of an output variable of Exudyn."""
     import exudyn as exu
 
     kinds, frames = exu.OutputVariableType, []

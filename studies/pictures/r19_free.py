@@ -36,7 +36,7 @@ PERSON: Colour = (0.93, 0.76, 0.55)
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = reporting(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
@@ -100,7 +100,8 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 
 
 def _arrow(kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses) -> Arrow:
-    """A force along an axis of the space, at the road under the point of a body where a tyre or side force is."""
+    """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
+    on its body."""
     (x, y, _), body = place.point, place.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
     return Arrow(f"{kind}, {place.name}", kind, body, points, force[:, None] * np.eye(3)[axis])

@@ -64,7 +64,7 @@ class Job(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its only case or file of tests, or its only run."""
+        """Name of the job: its first case, test file, or run."""
         return (*self.cases, *self.tests, *(f"{scene} in {engine}" for scene, engine in self.runs))[0]
 
     @property
