@@ -68,7 +68,8 @@ def _row_of_fault_count(data: Saved) -> Row:
 
 
 def _lines(data: Saved) -> list[tuple[str, ...]]:
-    """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed it."""
+    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
+    missed it."""
     return [
         *pitch_plane.lines(data["pitch-plane"]),
         *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
@@ -93,5 +94,5 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Draw how far above its tolerance each check of the pitch plane stands, fault by fault."""
+    """Plot how far above its tolerance each check's error is for every fault of the pitch plane."""
     return pitch_plane.draw(data["pitch-plane"])

@@ -46,7 +46,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _gains() -> list[Row]:
-    """Closed forms against the defining integrals, from laws that are all corner to laws that look straight."""
+    """Rows: gains by closed forms compared with their defining integrals, for spring laws from a single corner to
+    nearly straight ones."""
     spring = ride(NONLINEAR)[0].springs[0]
     worst, dry = 0.0, 0.0
     for curve, mean, size in ((spring.rate_force, 0.0, 0.3), (spring.travel_force, 0.01, 0.02)):
