@@ -91,7 +91,7 @@ def _published_road() -> float:
 
 
 def _frequencies() -> float:
-    """Errors of the 19 eigenfrequencies of R19-ride against published ones."""
+    """Errors of the 19 eigenfrequencies of R19-ride, against those that belong to its data."""
     rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
     return off(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 

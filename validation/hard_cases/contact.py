@@ -41,8 +41,8 @@ def next_to_none(implementation: str, folder: Path) -> float:
 
 
 def against(implementation: str, folder: Path) -> float:
-    """Case: spin whose pole lies anywhere in the ellipse, for all traction bounds. Error: error of 21 cells divided by
-    mu N."""
+    """Case: spin whose pole lies anywhere in the ellipse. Error: largest difference of the force with 21 cells from
+    that with 201, divided by mu N."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
     coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=cells) for cells in (21, 201))
