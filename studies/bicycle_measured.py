@@ -37,7 +37,8 @@ class BicycleObservations:
 def measured(
     folder: str | Path, choose: Sequence[float] = (), bicycle: Whipple | None = None, base: Control = FEEDBACK
 ) -> BicycleObservations:
-    """Choose suspects on the speeds ``choose`` (m/s), all if there are none, and predict the others; InputError."""
+    """Choose suspects from the measurements at the speeds ``choose`` (m/s, all by default), and predict weave at the
+    other speeds; raises InputError."""
     seen, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in seen]
     for speed in choose:

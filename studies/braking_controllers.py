@@ -88,7 +88,7 @@ def _single_procedure(
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse what a controller or a surface cannot be."""
+    """Raise InputError for options of a controller or a surface that are impossible."""
     check_reference(scene, engines)
     for alone in cases(scene).values():
         check_scene(alone, ("reference",))
@@ -130,7 +130,7 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
 
 
 def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
-    """Save the stops: a line of a table each, and a result with an axis of stops and the assumptions that any of them
+    """Save the stops: a CSV line for each, and a result with an axis of stops. It holds the assumptions that any stop
     broke."""
     heads = [*SHOWN_QUANTITIES, LOCKED] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}

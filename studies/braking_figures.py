@@ -118,7 +118,7 @@ def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label
 
 
 def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
-    """Roll and pitch (n, 2) in rad of the body."""
+    """Plot roll and pitch (n, 2) in rad of the body over time."""
     for values, colour, label in zip(
         np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
     ):
@@ -128,7 +128,7 @@ def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
 
 
 def _angles(axis: Axes, stop: Stop) -> None:
-    """Yaw, side slip and, of a train, the hitch."""
+    """Plot the yaw and side-slip angles over time and, for a train, the hitch angle."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color=VERMILION, label="side slip")
@@ -139,8 +139,8 @@ def _angles(axis: Axes, stop: Stop) -> None:
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
-    """Unit and corners (m, 2) in m in its axes: of the truck, the drawbar and the trailer's body, or of a vehicle on
-    its suspension and what it tows, each with a line to its hitch."""
+    """Outlines to draw, as unit number and corners (m, 2) in m in the unit's axes. They show truck, drawbar and
+    trailer, or a vehicle on its suspension and what it tows, each with a line to its hitch."""
     truck, trailer = vehicle_of(scene), scene.trailer
     boxes = [(0, _box(truck.front.x, truck.rear.x))]
     if trailer is not None:

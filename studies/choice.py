@@ -75,7 +75,7 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
+    """Choose effects of the scenes; saves ``SYSTEM.csv`` for each scene, and a figure."""
     check(scene, engines)
     beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
     return save_choices([scene, *beside], engines, folder, progress)
@@ -125,7 +125,7 @@ def _pass_progress(progress: Progress, title: str, completed: int, scene_count: 
 
 
 def has_closed_form(scene: Any) -> bool:
-    """Whether a scene's choice needs no runs."""
+    """Whether a scene's choice needs no runs in time."""
     if scene.system != "ride":
         return False
     from models.systems.ride.of_scene import goes_in_time
@@ -159,7 +159,7 @@ def search_text(scene: Any) -> str:
 
 
 def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> SceneChoice:
-    """A scene's choice by one implementation."""
+    """The choice for a scene in one engine."""
     engine = engine_of(scene, engines)
     with Crew.of(scene, usual=1).at_work(TOGETHER, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
@@ -173,7 +173,8 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
 
 
 def _linear(scene: Any) -> SceneChoice:
-    """The choice for a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
+    """The choice for a linear stationary ride scene by its closed form; numbers of calls are for one second of
+    motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
     from models.systems.ride.of_scene import scene_errors
@@ -233,7 +234,8 @@ def _answer(answered: SceneChoice) -> dict[str, Any]:
 
 
 def _save(choice: SceneChoice, path: Path) -> None:
-    """A row per effect: what leaving it out alone changes, what that saves, and whether it was left out."""
+    """Save a CSV file with a row per effect: the changes if it alone is left out, what this saves, and whether it was
+    left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
@@ -322,7 +324,7 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
 
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
-    """A panel per scene; one more for the activity of those that have it."""
+    """Figure with a panel per scene, and another panel for energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
@@ -338,7 +340,7 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
 
 
 def _changes(axis: Any, scene_choice: SceneChoice) -> None:
-    """Changes of every quantity by leaving out each effect alone.
+    """Plot how much each quantity changes if each effect alone is left out.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """

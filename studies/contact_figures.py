@@ -40,7 +40,8 @@ ARROWS = 17
 def contact_figure(
     patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
 ) -> None:
-    """Figure of pressure (its kind in the title) and tractions over the contact area, all patches to scale.
+    """Figure of the pressure and the tractions over the contact area, with all patches to scale; ``pressure`` is its
+    kind, for the title.
 
     forces : the result whose last motion is shown.
     """
@@ -98,7 +99,8 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
 
 
 def _arrows(f: Fields, spacing: float) -> Array:
-    """Position and traction (4, n) at points of an even net: in every so many rows of cells, and linear along each."""
+    """Positions and tractions (4, n) at evenly spaced points, which lie in some rows of cells and are interpolated
+    along them."""
     arrows, lines = list[Array](), f.y[:, 0]
     step = max(1, round(spacing / float(f.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
@@ -117,7 +119,7 @@ COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
 def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
-    """Forces and moment against a creepage, with the band of their error, and points of the exact theory.
+    """Plot forces and moment over a creepage, with their error band and some results of the exact theory.
 
     forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
     """

@@ -17,7 +17,7 @@ Progress = Callable[[str, float], None]
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse a scene of one contact, and a file that is not there."""
+    """Raise InputError for a scene of a single contact, and for a missing file."""
     if scene.cases is None:
         allowed = "needs the table [cases] with a file; one contact is what the study contact computes"
         raise InputError(scene.file, "study", scene.study, allowed)

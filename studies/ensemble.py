@@ -183,7 +183,7 @@ def _steepest(statistics: PathStatistics) -> Watched:
 
 
 def _rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
-    """Standard deviation and its standard error of pitch and heave at the asked times."""
+    """Standard deviations of pitch and heave, with their standard errors, at the times that the options list."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)

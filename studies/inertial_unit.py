@@ -121,14 +121,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
-    """Angle errors (samples, seconds + 1) in rad of one grade, by its number."""
+    """Angle errors (samples, seconds + 1) in rad of the grade with this number."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
 
 
 def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
-    """Largest angle error (rad) of each grade over the longest drive, and the damage error that KEEPING_SHARE of its
-    units keep, with the standard error of that."""
+    """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
+    KEEPING_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
     worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
     kept = [quantile(each, KEEPING_SHARE) for each in worst]
@@ -154,7 +154,7 @@ def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline)
 
 
 def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
-    """Standard deviation (deg) of one grade's angle error by its law, after some times (s)."""
+    """Standard deviation (deg) of a grade's angle error by its law at times (s)."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return np.degrees(angle_variance(seconds, walk, 0.0, drift, options.correlation_time) ** 0.5)
 
@@ -180,8 +180,8 @@ def _row(
 
 
 def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
-    """Duration in minutes -> coarsest grade (deg/h) of which KEEPING_SHARE of all units keep the allowed damage
-    error."""
+    """For each duration in minutes, the coarsest grade (deg/h) of which the share KEEPING_SHARE of units keeps the
+    allowed damage error."""
     cheapest_grades: dict[str, float | None] = {}
     for minutes in options.durations:
         judged = (row for row in rows if row["minutes"] == minutes and row["damage error"])

@@ -28,7 +28,7 @@ class Options(Strict):
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
-    """Refuse what has no limit cycle or no range."""
+    """Raise InputError for a scene without a limit cycle or a range of speeds."""
     if scene.contact.law == "linear":
         allowed = "without bound on the creep forces only flanges hold the motion: use fastsim"
         raise InputError(scene.file, "contact.law", scene.contact.law, allowed)
@@ -77,7 +77,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
-    """Plain numbers in SI."""
+    """Numbers of a limit cycle as plain values in SI."""
     return {name: float(getattr(orbit, name)) for name in names}
 
 

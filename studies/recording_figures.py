@@ -216,7 +216,7 @@ def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
 
 
 def inputs_figure(examination: Examination, path: Path) -> Path:
-    """Forces at all hubs along each axis."""
+    """Plot the forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     times = recording.period * np.arange(recording.count)
@@ -268,7 +268,7 @@ def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray,
 
 
 def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
-    """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
+    """Plot up to six section forces over the complete recording, and each for two seconds about its largest range."""
     times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
     drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
     for (left, right), answer in zip(panels, answers, strict=True):
@@ -284,7 +284,7 @@ def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: 
 
 
 def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
-    """Level crossings and range pairs of some loads."""
+    """Plot level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)

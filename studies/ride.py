@@ -112,8 +112,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """Cases of correlation: the scene's, then simpler ones; a wheel in the middle is on neither of two tracks that are
-    independent."""
+    """Cases of road correlation: the scene's own, then simpler ones. A wheel in the middle belongs to neither of two
+    independent tracks, so such a case is left out."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
@@ -123,7 +123,8 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
 
 
 def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
-    """The vehicle with the vertical acceleration of points along its heaviest body that pitches, if there is one."""
+    """The vehicle with added outputs: vertical accelerations at points along its heaviest body with pitch, if it has
+    one."""
     bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
     if not bodies or len(vehicle.axles) < 2:
         return None
@@ -143,7 +144,7 @@ def _save(results: Mapping[str, Result], folder: Path) -> None:
 
 
 def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: Path) -> None:
-    """The system at one speed for other programs."""
+    """Save the linear system at one speed for use in other programs."""
     from models.ride.covariance import stationary
     from models.ride.excited import excited
     from models.ride.export import save
@@ -195,13 +196,14 @@ def _table(
 
 
 def _value_without_rounding(deviations: np.ndarray) -> float:
-    """The scene's own of the deviations (cases,), 0 where symmetry leaves only rounding."""
+    """The scene's own of the standard deviations (cases,), or 0 if it is rounding of a value that vanishes by
+    symmetry."""
     largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
     return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING) else 0.0
 
 
 def _text(value: float, unit: str, status: str) -> str:
-    """A deviation with its unit, lengths in mm; the status where there is none."""
+    """Text of a standard deviation with its unit (mm for lengths), or its status if it is not finite."""
     if status != "finite":
         return status
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"

@@ -62,7 +62,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose, by runs for bent springs; saves ``choice.nc``, two CSV of it, a figure, files of what is left."""
+    """Choose effects, for nonlinear springs by runs; saves ``choice.nc``, two CSV files, a figure, and files of the
+    reduced scene."""
     check(scene, engines)
     if goes_in_time(scene):
         return save_choices([scene], engines, folder, progress)
@@ -106,7 +107,7 @@ def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
 
 
 def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
-    """Saved answer of a ride's choice: its effects, their changes and the saving."""
+    """Plain values of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted,
         "confirmed": choice.confirmed,
@@ -180,7 +181,8 @@ def choice_figure(
     results: dict[str, Result],
     path: Path,
 ) -> None:
-    """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
+    """Plot the changes by leaving out each effect alone and all together, with the tolerance, and the energy activity
+    of each element."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, save, subplots
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in single_effects]
@@ -231,7 +233,7 @@ def percent(value: float) -> str:
 def _table(
     scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], further: dict[Effect, float]
 ) -> list[str]:
-    """The choice in words."""
+    """Text of the choice."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
@@ -259,7 +261,7 @@ def _table(
 
 
 def saving(choice: RideChoice, tolerance: str) -> list[str]:
-    """Steps and calls at equal accuracy, in words."""
+    """Text on steps and calls at equal accuracy before and after the choice."""
     before, after = choice.before, choice.after
     lines = [
         f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "

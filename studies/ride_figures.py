@@ -166,7 +166,8 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
-    """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
+    """Plot the spectrum of the left track and the coherency of both tracks, measured, fitted, and for an isotropic
+    road."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted is not None:
@@ -192,7 +193,7 @@ def detail_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
+    """Table of colours with the errors of all outputs by model and road, and the cost of a covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
     heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
@@ -219,7 +220,7 @@ def detail_figure(
 
 
 def _signed(percent: float) -> str:
-    """A whole number with its sign; zero has none."""
+    """Text of a whole number with its sign; no sign for zero."""
     return f"{percent:+.0f}" if round(percent) else "0"
 
 
@@ -295,7 +296,7 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
 def engine_spectra_figure(
     runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
 ) -> None:
-    """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
+    """Plot spectra of the engines' runs, by Welch's method, over those of the statistically linearised vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
     expected = one_sided(linear, road, speed, frequency)
     first = next(iter(runs.values()))
@@ -315,7 +316,7 @@ def engine_spectra_figure(
 
 
 def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
-    """Two or three small panels beside each other."""
+    """Figure with two or three small panels side by side."""
     figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes

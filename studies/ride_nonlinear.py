@@ -165,7 +165,8 @@ def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str,
 
 
 def _time_table(runs: dict[str, Ride], answer: Nonlinear, road: Excitation, speed: float) -> list[str]:
-    """Deviations of the engines' runs beside those of statistical linearisation, and how far the engines are apart."""
+    """Table of the engines' standard deviations next to those of statistical linearisation, and of the difference
+    between the engines."""
     if not runs:
         return []
     shown, (first, *others) = answer.shown, runs.items()

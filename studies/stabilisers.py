@@ -65,7 +65,7 @@ def _steps(results: Results) -> str:
 
 
 def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
-    """The table as lines of text, a block per engine and road."""
+    """The table as lines of text, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {CONVENTION}, exponent {options.slope:g}. Accepted: all four body-frame ratios within "
         f"{options.limits.damage_error:.0%},",

@@ -157,7 +157,7 @@ def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], o
 
 
 def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
-    """Drift-off by source, and the noise paths."""
+    """Channels of the drift-off times by source, and of the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")
@@ -181,7 +181,7 @@ NAMES = {
 def _rows(
     curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
-    """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
+    """Predicted and measured drift-off times (s) by source; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
         measured, quartiles = runs[name].passes(options.angle) if name in runs else None, None
@@ -197,7 +197,8 @@ def _rows(
 def _text(
     rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Lines for the terminal: the table of trust, and what it would take to trust a longer run."""
+    """Lines for the terminal: predicted and measured drift-off times, and what a longer trustworthy run would
+    require."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
         *(f"  {NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured(row):>10}" for row in rows),

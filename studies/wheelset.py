@@ -73,7 +73,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _results(paths: Paths) -> dict[str, Result]:
-    """Paths by engine and speed, in words."""
+    """Results of all paths, named by engine and speed."""
     return {
         f"{engine}, {at}": path
         for engine, paths_of_engine in paths.items()
@@ -82,7 +82,7 @@ def _results(paths: Paths) -> dict[str, Result]:
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
-    """Damping and frequency over the speeds."""
+    """Save a CSV table of damping and frequency over speed."""
     columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
     for engine, linear_run in linear.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
@@ -92,7 +92,7 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
 
 
 def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
-    """Critical speed and figures of the paths as plain numbers in SI; None where there is no critical speed."""
+    """Critical speed (None if there is none) and figures of the paths, as plain numbers in SI."""
     return {
         "klingel": klingel(wheelset),
         "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
@@ -124,7 +124,7 @@ def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
 
 
 def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """The critical speed of every implementation, with the frequency there; or that there is none."""
+    """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
     lines = [
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),

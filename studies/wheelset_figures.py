@@ -49,7 +49,7 @@ def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
-    """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
+    """Plot growth rate and wavelength of the hunting motion over speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
@@ -140,7 +140,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 
 
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
-    """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
+    """Plot amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones open."""
     orbits: Sequence[Orbit] = branch.detail
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
@@ -195,7 +195,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
 
 
 def conicity_figure(run: Result, title: str, path: Path) -> None:
-    """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
+    """Plot the rolling radius difference with the amplitudes of the waves, and both conicities over the amplitude."""
     conicities: Conicities = run.detail
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows

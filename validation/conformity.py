@@ -77,7 +77,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
 
 
 def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
-    """The rows, each printed as soon as it is there: a slow engine takes minutes."""
+    """Print each row as soon as it is computed, because a slow engine takes minutes; yields the rows."""
     for row in rows:
         print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}", flush=True)
         yield row

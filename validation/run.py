@@ -72,7 +72,7 @@ class Cases:
         return _array([self.record(self.names[i]) for i in paths])
 
     def record(self, name: str) -> Saved:
-        """Measure one case; raises what the case raises."""
+        """Measure one case; exceptions of the case pass through."""
         start = time.perf_counter()
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(
@@ -83,7 +83,8 @@ class Cases:
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
     def facts(self) -> Saved:
-        """Facts on which rows depend: quick or full share, code version, and which measured files are available."""
+        """Facts on which rows depend: the cases, quick or full share, code version, and the available measured
+        files."""
         root, here = data_folder(), Path(__file__).parent
         sizes = (
             {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
@@ -164,7 +165,7 @@ def validate(
 
 
 def _data() -> str:
-    """Names of the measured files that are available."""
+    """Text on the number and size of the measured files that are available."""
     folder = data_folder()
     if folder is None:
         return "no measured files: TWINRIG_DATA names no folder; the rows that need some are not run"

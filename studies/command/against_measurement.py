@@ -208,7 +208,7 @@ def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: R
 
 
 def saved_results(place: Path) -> dict[str, Result]:
-    """The saved results of a file or a folder, by their names; InputError where there are none."""
+    """All saved results in a file or folder, by name; raises InputError if there are none."""
     if not place.exists():
         raise InputError(place, "", None, "no such file or folder")
     files = [place] if place.is_file() else sorted(place.rglob("*.nc"))

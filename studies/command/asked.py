@@ -36,7 +36,7 @@ def load_scene(name: str, changes: list[str] | None) -> Any:
 
 
 def scene_path(name: str) -> Path:
-    """The file of a scene; InputError if there is none."""
+    """Path of a scene's file; raises InputError if there is no such scene."""
     names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
     if name in names:
         return SCENES / f"{name}.toml"
@@ -79,7 +79,7 @@ def _runs(scene: Any, engine: str) -> bool:
 
 
 def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
-    """Whether a study needs no array library besides numpy: it has no workers, no units to convert, no user's code."""
+    """Whether a study can run with numpy alone: it uses no workers, no unit conversion, and no user's code."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
     shared = hasattr(module, "BLOCKS") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
@@ -91,7 +91,7 @@ def plan_of(scene: Any) -> Any:
 
 
 def findings_of(scene: Any) -> tuple[Finding, ...]:
-    """Doubts about what a scene puts in, before anything is run; raises InputError for what cannot be."""
+    """Doubts about the input of a scene, before anything is run; raises InputError for impossible input."""
     look = getattr(plan_of(scene), "findings", None)
     unended = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
     return (*(look(scene) if look else ()), *unended)

@@ -26,7 +26,8 @@ EQUAL_PLACES = 1e-9
 
 
 def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
+    """Differences of all quantities that occur in both results, largest relative one first, and notes on quantities
+    that occur in only one.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
@@ -48,7 +49,7 @@ def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple
 
 
 def _by_share(differences: list[QuantityDifference], first: object, second: object) -> list[QuantityDifference]:
-    """The largest share first; raises InputError where there is none."""
+    """Differences sorted by their share of the quantity, largest first; raises InputError if there are none."""
     if not differences:
         raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
     return sorted(differences, key=lambda each: -each.share)
@@ -64,7 +65,8 @@ def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> li
 
 
 def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
-    """Files to compare, the two themselves or those of the same name in both folders, and notes on the others."""
+    """Pairs of files to compare: the two given files, or files of equal name in both folders; and notes on files
+    without a partner."""
     for path in (earlier, later):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
@@ -92,7 +94,8 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    """Results of a folder by their names within it; netCDF files alone where there are any that no table repeats."""
+    """Result files of a folder by name. If there are netCDF files, CSV files count only where they are not a copy of
+    one."""
     files = [
         path
         for path in sorted(folder.rglob("*"))
@@ -110,7 +113,7 @@ def _tabled(path: Path) -> bool:
 
 
 def results_of(first: Path, second: Path) -> dict[str, Result]:
-    """The results that are compared, by their files: those of tables are the netCDF files beside them."""
+    """Results to compare, by file; for a CSV table beside a netCDF file, the netCDF file is read."""
     files = [file for _, *pair in _pairs(first, second)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
     return {
@@ -121,7 +124,7 @@ def results_of(first: Path, second: Path) -> dict[str, Result]:
 
 
 def _result(path: Path) -> Result | None:
-    """The saved result of a file, or of the netCDF file beside a table; None where there is none."""
+    """The saved result of a file, or of the netCDF file that belongs to a CSV table; None if there is none."""
     beside = path.with_suffix(".nc")
     return load(beside) if beside.is_file() else None
 
@@ -280,7 +283,7 @@ def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
 
 
 def lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
-    """Lines for the screen: what differs most, and the notes."""
+    """Lines for the screen: the quantities with the largest differences, and the notes."""
     return [*_lines(differences), *(f"  {note}" for note in notes)]
 
 

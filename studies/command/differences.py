@@ -25,7 +25,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class QuantityDifference:
-    """``second`` less ``first`` over ``grid`` (n,); ``note`` : how the two were brought to the same rows.
+    """Difference ``second`` minus ``first`` over ``grid`` (n,); ``note`` : how both were brought to the same rows.
 
     stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
     """
@@ -48,7 +48,7 @@ class QuantityDifference:
 
     @property
     def gap(self) -> np.ndarray:
-        """(n,) nan in both is no difference; infinite where only one of them is a number, or the infinities differ."""
+        """Difference (n,); 0 where both are NaN, infinite where only one is a number or the infinities differ."""
         with np.errstate(invalid="ignore"):
             gap = self.second - self.first
         same = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
@@ -76,7 +76,7 @@ class QuantityDifference:
 
     @property
     def where(self) -> str:
-        """Place of the largest difference, in words."""
+        """Text on where the difference is largest."""
         return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property

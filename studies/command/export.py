@@ -29,7 +29,8 @@ def _systems() -> tuple[str, ...]:
 
 
 def target(scene: Any, engine: str, output_path: Path | None) -> Path:
-    """The file to write; InputError where it is there already, has another end, or lies in no folder."""
+    """Path of the file to write; raises InputError if it exists, has the wrong extension, or its folder does not
+    exist."""
     suffix = SUFFIXES.get(engine, "")
     path = output_path or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
     if path.suffix != suffix:

@@ -66,7 +66,7 @@ def finish(
 
 
 def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | None, resume: Path | None) -> Path:
-    """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
+    """Folder for the results: a new one, or that of an interrupted run, whose finished parts are in ``blocks``."""
     from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:

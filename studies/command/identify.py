@@ -55,7 +55,8 @@ def identify(
 def profiles_of(
     scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, tell: Tell = lambda text, share: None
 ) -> Iterator[LikelihoodProfile]:
-    """Profiles of every parameter, or of those that the data do not determine, computed by the scene's crew."""
+    """Likelihood profiles of all parameters, or only of those that the data do not determine, computed by the scene's
+    workers."""
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.determined[k]
     ]
@@ -99,7 +100,7 @@ def report(
 
 
 def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
-    """All of it in plain values; None stands for a standard error that is none."""
+    """Uncertainty and profiles as plain values; None where a standard error does not exist."""
     solved, names = uncertainty.fit, [each.name for each in uncertainty.fit.problem.parameters]
     return {
         "estimates": {
@@ -131,7 +132,7 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
 
 
 def correlation(uncertainty: Uncertainty) -> np.ndarray:
-    """(p, p): of the estimates, 0 with those at a bound."""
+    """Correlation matrix (p, p) of the estimates; 0 for estimates at a bound."""
     size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
     return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
@@ -142,7 +143,7 @@ def _finite_number(value: float) -> float | None:
 
 
 def errors(fit: Fit) -> dict[str, float]:
-    """Rms error of each channel by its rms."""
+    """For each channel, ratio of the rms error to the rms of the channel."""
     weights = fit.problem.weights > 0.0
     return {
         channel.name: float(np.sqrt(np.mean(row[used] ** 2)))

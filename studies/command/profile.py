@@ -61,7 +61,7 @@ class Watch:
             last = now
 
     def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
-        """Do the work, end the watch, and add its lines to the summary of the work."""
+        """Do the work, stop the watch, and add its lines to the summary."""
         summary = work(progress)
         self._over.set()
         self._thread.join()

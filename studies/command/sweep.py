@@ -122,7 +122,8 @@ def _failed(reason: object) -> Record:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into that takes its name when all of it is there, in place of what may lie there."""
+    """Context with a folder to write into. It gets its final name only when it is complete, and replaces an older
+    folder of this name."""
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     part.mkdir(parents=True)
     try:
@@ -155,7 +156,7 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
 
 
 def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
-    """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
+    """The job of the sweep in ``text``, without its folder; raises InputError if none of its points can be run."""
     key, values = parse_range(text)
     job = Points(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
@@ -163,7 +164,7 @@ def points(text: str, scene: str, changes: Sequence[str], engine: str | None, er
 
 
 def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
-    """Evenly spaced values; whole numbers where both ends and the spacing are."""
+    """Evenly spaced values; integers if both ends and the spacing are integers."""
     try:
         ends, n = (float(first), float(last)), int(count)
     except ValueError:
@@ -176,7 +177,7 @@ def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
 
 
 def _listed(rest: str) -> tuple[Any, ...]:
-    """Values as a scene file would hold them, or texts without quotes."""
+    """Values of a list in a scene file's notation; words may lack quotes."""
     try:
         return tuple(tomllib.loads(f"x = [{rest}]")["x"])
     except ValueError:
@@ -189,7 +190,7 @@ def _value_text(value: Any) -> str:
 
 
 def _writable(value: Any) -> bool:
-    """Whether a scene file that holds what is written holds this value."""
+    """Whether a scene file can represent this value exactly."""
     try:
         return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
     except ValueError:

@@ -120,7 +120,7 @@ def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Pat
 
 
 def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
-    """Places on the axis and, for values that are no numbers, what is written there."""
+    """Positions on the axis; for values that are not numbers also the labels to write there."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.array(values, float), []
     return np.arange(float(len(values))), [str(value)[:18] for value in values]

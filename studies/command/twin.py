@@ -85,7 +85,7 @@ class Twins:
 
 
 def check_asked(files: Sequence[Path], page: Path | None) -> None:
-    """InputError for too many files, and for a page that cannot be written."""
+    """Raise InputError for too many files, or for a page that cannot be written."""
     if len(files) > 2:
         raise InputError("FILES", "", len(files), "files: one, or two to be compared")
     if page is None:
@@ -102,7 +102,7 @@ def kinds(text: str) -> tuple[str, ...]:
 
 
 def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell: Tell = _silent) -> Twins:
-    """Certify each file, and compare two; InputError for what cannot be read or built.
+    """Certify each file, and compare both if there are two; raises InputError if a file cannot be read or built.
 
     tell : told what is done now, and which part of all.
     """

@@ -91,7 +91,7 @@ class Waiting:
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Set the bar's text to the work that begins, and its share to the part that is done."""
+        """Set the text of the bar to the task that begins, and its share to the finished part."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:

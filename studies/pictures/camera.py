@@ -62,7 +62,8 @@ class Camera:
 
 
 def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
-    """Image (h, w, 3) of surfaces before a sky, whose two colours are those of the picture's top and of the horizon.
+    """Image (h, w, 3) of surfaces in front of a sky, with the sky's two colours at the picture's top and at the
+    horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """

@@ -37,7 +37,7 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
 
 
 def lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Where each arrow of frame ``k`` begins and what it spans (3,), in m of the picture."""
+    """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
     spans = []
     for force in motion.arrows:
         place, turn = pose(motion, stage, force.body, k)

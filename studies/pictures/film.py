@@ -28,7 +28,8 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class FilmedMotion:
-    """Poses from one engine at times (f,) in s: places (f, 3) and turns (f, 3, 3) of each body, space from body.
+    """Motion from one engine at times (f,) in s: positions (f, 3) and rotations (f, 3, 3) of each body, from body to
+    space axes.
 
     run : the result that is drawn, where its system has one.
     """
@@ -106,7 +107,8 @@ Poses = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) -> Poses:
-    """Poses by ``mj_kinematics`` at ``qpos`` (f, nq); ``bodies`` are MuJoCo's numbers of them."""
+    """Poses of bodies at MuJoCo's coordinates ``qpos`` (f, nq), by ``mj_kinematics``; ``bodies`` : MuJoCo's body
+    numbers."""
     import mujoco
 
     data, frames = mujoco.MjData(model), []
@@ -129,7 +131,7 @@ def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates:
 
 
 def _poses(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
-    """Poses of place and turn of every body in every frame."""
+    """Position and rotation of every body over all frames."""
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)
     }

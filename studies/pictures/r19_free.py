@@ -122,7 +122,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
-    """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
+    """Surfaces of wheels at the tyres, a car around the chassis, and the engine and occupants inside."""
     person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
     return {
         **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
@@ -134,7 +134,7 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
 
 
 def _car(vehicle: SpatialVehicle) -> list[PaintedSurface]:
-    """Two convex outlines, through which one sees what is inside, about the chassis' own centre."""
+    """Transparent car body of two convex outlines, about the chassis' centre of mass."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
     lower = [

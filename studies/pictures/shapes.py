@@ -125,7 +125,7 @@ def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> Pa
 
 
 def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
-    """An arrow of exactly the vector's length (m); None where it is shorter than a tenth of its thickness."""
+    """An arrow as long as the vector (m); None if it is shorter than a tenth of its thickness."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:
         return None

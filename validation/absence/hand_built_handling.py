@@ -116,7 +116,8 @@ def _wheel(w, frame, passing, q, v, i, left):
 
 @lean
 def _bar(bar, i, left, q, f):
-    """A bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the chassis' roll."""
+    """Add the forces of an anti-roll bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the
+    chassis' roll."""
     (stiffness, held, by), (places, pushes, _) = bar, left
     twist = held + stiffness * (q[4] - (row(places, 3, i)[2] - row(places, 3, i + 1)[2]) * by)
     f[4] -= twist
@@ -223,7 +224,8 @@ def numbers_of(handling: Handling) -> np.ndarray:
 
 
 def model_of(handling: Handling, step: float) -> mujoco.MjModel:
-    """The car in MuJoCo, the table among its numbers; bodies without inertia get it as the model is there."""
+    """The car's model in MuJoCo, which carries the parameter table; bodies without inertia get it when the model
+    exists."""
     car, table = handling.vehicle, numbers_of(handling)
     chassis = car.body("body")
     bodies = "".join(

@@ -73,7 +73,7 @@ def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, 
 
 
 def controlled(system: str) -> tuple[str, ...]:
-    """Effects that can be put into a bare scene, by their usual values or by hand."""
+    """Effects that can be added to a bare scene, with their usual values or with tables written by hand."""
     modules = {name: module_of(system, name) for name in names_of(system)}
     return tuple(
         name
@@ -185,7 +185,7 @@ def _loaded(modules: list[str]) -> list[str]:
 
 @cache
 def measured_counts() -> dict[str, Any]:
-    """The facts of ``probed``, gathered in a process of its own."""
+    """The facts of ``probed``, computed in a process of their own."""
     code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))

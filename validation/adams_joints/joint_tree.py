@@ -29,7 +29,7 @@ BODY = "body"
 
 @dataclass(frozen=True, eq=False)
 class JointTree:
-    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in those of the ground."""
+    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in the ground's axes."""
 
     mechanism: Mechanism
     axes: np.ndarray
@@ -60,7 +60,7 @@ class JointTree:
         return SpatialVehicle("mechanism", (*held, body), (), (), ())
 
     def driven(self) -> Driven:
-        """What an engine builds."""
+        """The vehicle as the engines build it, with its springs as compiled forces."""
         vehicle = self.vehicle()
         springs = [
             replace(spring, ground=self.local(spring.ground), body=self.local(spring.body))

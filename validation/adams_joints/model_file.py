@@ -81,7 +81,7 @@ class Statement:
 
 
 def read_statements(path: str | Path) -> list[Statement]:
-    """All statements of a file that change its motion; InputError for what is not supported, by name and line."""
+    """All statements of a file that affect its motion; raises InputError with name and line for unsupported ones."""
     try:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

@@ -97,7 +97,7 @@ def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
 
 
 def _centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
-    """(m, 3): places of the body's centre at MuJoCo's positions (m, nq)."""
+    """Positions (m, 3) of the body's centre at MuJoCo's coordinates (m, nq)."""
     data, places = mujoco.MjData(twin.model), np.empty((len(positions), 3))
     for place, data.qpos[:] in zip(places, positions, strict=True):
         mujoco.mj_kinematics(twin.model, data)

@@ -56,7 +56,7 @@ Progress = Callable[[str, float], None]
 
 
 class Job(NamedTuple):
-    """What a process runs: cases and tests, or scenes in engines."""
+    """A job for a worker process: cases and tests to run, or scenes to run in engines."""
 
     cases: list[str]
     tests: list[str]
@@ -69,7 +69,7 @@ class Job(NamedTuple):
 
     @property
     def trace(self) -> str:
-        """Name of the file of its trace."""
+        """Name of the file for this job's trace."""
         return self.name.rpartition("/")[2].replace(".py", "").replace(".toml", "").replace(" ", "_") + ".jsonl"
 
 

@@ -155,7 +155,7 @@ class Watching:
             self.told.refused |= is_of_numba(call.excinfo.value)
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Note what grounds a test names."""
+        """Record the independent grounds that a test names."""
         marker = item.get_closest_marker("grounds")
         if marker:
             item.user_properties.append(("grounds", marker.args[0]))

@@ -122,7 +122,7 @@ def _imported(module: str, name: str) -> tuple[str, str] | None:
 
 @cache
 def original(module: str, name: str) -> Function | None:
-    """The definition of a function as it stands in the sources; None where there is none."""
+    """Definition of a function in the unchanged sources; None if there is none."""
     try:
         return function_of(tree(module), name)
     except (NoSuchFunction, OSError):

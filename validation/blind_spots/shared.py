@@ -108,6 +108,7 @@ def candidates() -> list[str]:
 
 
 def shared_functions(several: Collection[str]) -> list[str]:
-    """``module:name`` of all shared functions, compiled ones first; several : those that several engines call."""
+    """``module:name`` of all shared functions, compiled ones first; several : Python functions that several engines
+    call."""
     compiled = set(compiled_functions())
     return [name for name in candidates() if name in compiled or name in several]

@@ -60,7 +60,7 @@ def towing() -> Sprung:
 
 @cache
 def in_row() -> Sprung:
-    """The twin with a trailer of a drawbar and a box, all of it without symmetry."""
+    """The twin with a trailer made of a drawbar and a box, all without symmetry."""
     return sprung(train(), SPIN)
 
 

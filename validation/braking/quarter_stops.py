@@ -44,7 +44,7 @@ class FrictionCurve(NamedTuple):
 
 
 class FrictionChange(NamedTuple):
-    """A road on which friction changes at a place (m)."""
+    """A road whose friction changes at a position (m)."""
 
     before: FrictionCurve
     behind: FrictionCurve

@@ -193,7 +193,8 @@ def truck_stop(surface_name: str, name: str, speed: float) -> Recorded:
 
 
 def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
-    """Figures of one stop: distance (m), time (s), utilisation above 15 km/h, longest lock there (ms)."""
+    """Figures of one stop: distance (m), time (s), and above 15 km/h the friction utilisation and the longest wheel
+    lock (ms)."""
     path = truck_stop(surface_name, name, speed)
     speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE))

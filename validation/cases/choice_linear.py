@@ -348,7 +348,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Draw predicted over confirmed changes of the choice, and the computing time saved over the tolerance."""
+    """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

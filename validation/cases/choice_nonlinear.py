@@ -209,7 +209,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Predicted against confirmed changes, and savings over tolerance."""
+    """Plot predicted over confirmed changes, and savings over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -198,7 +198,7 @@ def _mirrored_profiles() -> list[Row]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Both conicities of the standard's profiles within its limits."""
+    """Plot both conicities of the standard's profiles with the standard's limits."""
     from models.drawing.figures import BLUE, VERMILION, heading, legend_below, panels
 
     standard = data["standard"]

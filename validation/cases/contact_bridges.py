@@ -318,7 +318,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Cost per step over the law, and shares of engine, kernel and bridge."""
+    """Plot cost per step for each law, and shares of engine, kernel and bridge."""
     if "points" not in data:
         return []
     from validation.contact.contact_bridges_figure import figure

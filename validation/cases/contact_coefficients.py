@@ -218,7 +218,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Coefficients over the ratio of axes, and how far the library is from the exact theory."""
+    """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))

@@ -212,7 +212,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Axes over the ratio of curvatures, and the error over the ratio of axes."""
+    """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

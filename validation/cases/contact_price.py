@@ -244,5 +244,5 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """None: what accuracy costs in contact is drawn beside the other problems of ``price``."""
+    """No figure, since the cost of accuracy in contact is drawn with the other problems of ``price``."""
     return []

@@ -242,7 +242,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Place of contact and its load over the shift."""
+    """Plot position and load of the contact points over the lateral shift."""
     from models.drawing.figures import heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))

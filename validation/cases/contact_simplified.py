@@ -369,7 +369,7 @@ def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Errors of the two pressure profiles by shape."""
+    """Plot the errors of the two pressure profiles for each shape."""
     if "shapes" not in data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots

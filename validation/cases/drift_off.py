@@ -202,7 +202,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Measured over predicted."""
+    """Plot measured over predicted drift-off times."""
     from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, subplots
 
     figure, axis = subplots(figsize=(5.2, 4.2))

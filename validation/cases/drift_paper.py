@@ -151,7 +151,7 @@ def _at_rate(rate: float) -> dict[str, float]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
+    """Tables of all runs of the reference, and of undisturbed runs at several sampling rates."""
     rows = tuple(
         (
             row["run"],

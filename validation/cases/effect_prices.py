@@ -205,7 +205,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
 
 
 def _stops(quick: bool) -> list[Row]:
-    """Rows: a truck brakes in a turn on snow, by the reference and by code written for this stop alone.
+    """Rows: a truck brakes in a turn on snow, in the reference, compared with code written for this stop alone.
 
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
@@ -251,7 +251,7 @@ def _contact(quick: bool) -> list[Row]:
 
 
 def _choice() -> Row:
-    """Row: time of choosing the effects of a linear car, divided by the time of its full covariance."""
+    """Row: ratio of the time to choose the effects of a linear car to the time of its full covariance."""
     (ratio, low, high), told = price_of_choice()
     return Observed(
         "effect_prices.choice",

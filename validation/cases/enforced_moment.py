@@ -220,7 +220,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Start-up ringing of the multiplier."""
+    """Plot how the multiplier rings after an abrupt start."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))

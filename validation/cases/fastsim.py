@@ -352,7 +352,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Largest error over the cells."""
+    """Plot the largest error over the number of cells."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))

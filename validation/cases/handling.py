@@ -192,7 +192,7 @@ def _stop_rows() -> list[Row]:
 
 
 def _transfer_rows() -> list[Row]:
-    """Rows: load transfer of the car and of a box on four springs, against the balance of all their bodies."""
+    """Rows: load transfer of the car, and of a box on four springs, compared with the balance of all bodies."""
     rows = []
     for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
         braking = braked_error(drive_run("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)

@@ -64,7 +64,7 @@ def scene(
     road: bool = False,
     override: dict[str, float] | None = None,
 ) -> Scene:
-    """The half car on tyres that only push: on the study road from rest, or dropped on a flat one."""
+    """Scene of the half car on tyres that can lift off: on the study road from rest, or dropped onto a flat road."""
     return build_scene(
         {
             "title": TITLE,
@@ -249,8 +249,8 @@ def _pulls(quick: bool) -> list[Row]:
 
 
 def _in_space(quick: bool) -> list[Row]:
-    """Rows of R19-ride with tyres that lift off: accelerations against hand-written equations, and both engines on a
-    random road."""
+    """Rows on R19-ride with tyres that lift off: accelerations compared with hand-written equations, and both engines
+    compared on a random road."""
     ride = build_ride(
         {
             "title": TITLE,

@@ -301,7 +301,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Mean place and force of the right wheel beside CONTACT's."""
+    """Plot mean position and force of the right wheel, together with CONTACT's."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, heading, legend_below, subplots
 
     published = np.array(data["published"])

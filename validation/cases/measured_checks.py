@@ -296,7 +296,7 @@ def _moving_car(folder: Path) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Table of the findings that an engineer is told."""
+    """Table of the findings that the checks report to an engineer."""
     rows = tuple((name, text) for name, text in data["said"].items())
     return [Table("What the checks say of planted faults", "The first sentence of each.", ("planted", "said"), rows)]
 

@@ -295,7 +295,7 @@ def memory(path: Path, extension: str) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Table of what each file format keeps."""
+    """Table of what each file format preserves."""
     note = (
         f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
         "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "

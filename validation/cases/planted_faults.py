@@ -77,7 +77,7 @@ def _lines(data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """All faults in one table, then each system's with sizes and what its checks are."""
+    """Table of all faults, then tables for each system with errors and descriptions of the checks."""
     lines = _lines(data)
     systems = len({line[0] for line in lines})
     note = (

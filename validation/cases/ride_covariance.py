@@ -107,7 +107,7 @@ def _compared(
 
 
 def _closed_rows() -> list[Row]:
-    """Quarter car and half car against their formulas."""
+    """Rows: quarter car and half car compared with closed formulas."""
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         variance = stationary(excited(corners([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)).variance
@@ -272,7 +272,7 @@ BODY_POINTS = ("body front", "body centre", "body rear")
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Agreement of the two routes beside what each claims of itself."""
+    """Table of the agreement between two routes, with the error that each states."""
     rows = tuple(
         (
             route["vehicle"],

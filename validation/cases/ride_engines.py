@@ -245,7 +245,7 @@ def _without_curves() -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """What a simulated second costs."""
+    """Table of computing times for one simulated second."""
     if not data["price"]:
         return []
     note = (

@@ -55,7 +55,7 @@ def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
 
 
 def samples(name: str, count: int) -> list[Saved]:
-    """Samples of a system as JSON keeps them."""
+    """Samples of a system in the form for JSON."""
     drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
     return [_sample_as_table(name, sample) for sample in drawn]
 

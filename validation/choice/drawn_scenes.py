@@ -38,7 +38,8 @@ SEED = 2210
 
 
 def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A half car on a road, with a pitch spring of any strength and a gyro; half of them start off their rest."""
+    """A random half car on a road, with a pitch spring of random strength and a gyro; half of them start away from
+    rest."""
     road = [
         {"source": "study", "speed": float(rng.uniform(8.0, 30.0))},
         {

@@ -75,7 +75,8 @@ def trajectory_gap(make_engine: Make, assembly: Assembly, settings: Settings) ->
 
 
 def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
-    """Largest difference of any state at common times; ``other_trajectory`` may be finer by a whole factor."""
+    """Largest difference of any state at common times; ``other_trajectory`` may have a time step smaller by an integer
+    factor."""
     if path is None:
         return float("inf")
     every = (len(other_trajectory.times) - 1) // (len(path.times) - 1)

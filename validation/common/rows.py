@@ -58,7 +58,7 @@ class Row:
         return replace(self, status="failed", reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
-        """The row as ``results.json`` keeps it."""
+        """The row in the form for ``results.json``."""
         return asdict(self)
 
 

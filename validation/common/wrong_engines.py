@@ -63,7 +63,7 @@ class Swapped(Right):
     """Faulty integrator: front and rear wheel are exchanged in the result."""
 
     def told(self, states: np.ndarray) -> np.ndarray:
-        """The states, two columns of which are exchanged."""
+        """States with two columns exchanged."""
         return states[:, [1, 0, 2, 3, 5, 4, 6, 7]]
 
 

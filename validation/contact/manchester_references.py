@@ -81,7 +81,7 @@ def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[f
 
 
 def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[float]:
-    """Normal forces (N) of the right wheel's patches, each on a half-space of its own.
+    """Normal forces (N) of the right wheel's patches, each computed with a half-space of its own.
 
     Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
     """

@@ -187,7 +187,7 @@ def _spin(factor: float) -> Patch:
 
 
 def _one_bit_less(original: Any) -> Any:
-    """Fault: a signal is converted with a bit less than stated."""
+    """Fault: a signal is converted with one bit less than stated."""
     return lambda table, *rest: original(table.model_copy(update={"bits": table.bits - 1}), *rest)
 
 

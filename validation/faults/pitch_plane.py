@@ -141,7 +141,7 @@ def lines(data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """The checks with their tolerances, and every fault with what sees it."""
+    """Tables of the checks with their tolerances, and of every fault with the checks that see it."""
     return [_check_table(data), _fault_table(data)]
 
 

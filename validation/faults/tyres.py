@@ -67,7 +67,7 @@ def _balance() -> float:
 
 
 def _sliding() -> float:
-    """Check of locked wheels: deviation of their force from mu N against the sliding velocity."""
+    """Error of the force on locked wheels, which should be mu N against the sliding velocity."""
     car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
     report, _ = _read(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())

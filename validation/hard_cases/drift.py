@@ -161,7 +161,7 @@ def two_points(engine: str, folder: Path) -> float:
 
 
 def two_points_naive(folder: Path) -> str:
-    """Damage of a load of two points, by the rainflow library."""
+    """Without the guard: damage of a load with two samples by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"

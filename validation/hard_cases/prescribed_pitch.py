@@ -177,7 +177,7 @@ def noisy(engine: str, folder: Path) -> float:
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
-    """Moment that noise of 1e-6 rad on samples every 0.125 ms causes, divided by its finite-difference value."""
+    """Enforced moment caused by noise of 1e-6 rad on samples every 0.125 ms, divided by its finite-difference value."""
     return _noisy(engine, 1.25e-4)
 
 

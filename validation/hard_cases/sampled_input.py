@@ -279,8 +279,7 @@ def passed_over(engine: str, folder: Path) -> float:
 
 
 def passed_over_naive(folder: Path) -> str:
-    """Error of a run whose steps miss waves of the road: without its stated error, against steps that resolve every
-    wave."""
+    """Without the guard: error of a run whose steps miss waves of the road, against steps that resolve every wave."""
     ends = [_over_waves("reference", step)["z1_rate"][-1] for step in (2e-3, 1e-4)]
     return f"without its error the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
 

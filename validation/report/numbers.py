@@ -13,7 +13,8 @@ PLAIN = (1e-3, 1e5)
 
 
 def number(value: Any, digits: int = 4) -> Markup:
-    """A number with so many significant digits, as ``0.0123`` or ``8.9e-16``; text stays text, None a dash."""
+    """Text of a number with ``digits`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is, None
+    becomes a dash."""
     if value is None or value == "":
         return Markup("–")
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -40,7 +41,7 @@ def _scientific(value: float, digits: int) -> str:
 
 
 def _significant(value: float, digits: int) -> str:
-    """Fixed notation with so many significant digits, without trailing zeros."""
+    """Text in fixed notation with ``digits`` significant digits, without trailing zeros."""
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if value else 0
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text

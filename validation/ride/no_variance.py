@@ -79,8 +79,8 @@ def _white_rows() -> list[Row]:
 
 
 def _free_rows() -> list[Row]:
-    """Rows on a free vehicle with three zero eigenvalues: they are found, do not spoil the variances, and do so with
-    slycot as well; with roll steer the heading diffuses."""
+    """Rows on a free vehicle with three zero eigenvalues. They are found and do not spoil the variances, with slycot or
+    without; with roll steer the heading diffuses."""
     free = load_vehicle("r19_free")
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)

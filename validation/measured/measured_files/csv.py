@@ -35,7 +35,7 @@ def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "u
 
 
 def changed_rows(index: int, row: str) -> list[str]:
-    """The rows with one of them changed."""
+    """The rows of the usual file with one row changed."""
     return [*csv_rows()[:index], row + "\n", *csv_rows()[index + 1 :]]
 
 

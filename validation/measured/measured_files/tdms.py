@@ -53,7 +53,7 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
 
 
 def changed(offset: int, new: bytes, length: int | None = None) -> Make:
-    """Make the usual file with other bytes, or cut off, counted from the beginning of its last segment."""
+    """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
 
     def change(data: bytes) -> bytes:
         begin = data.rindex(b"TDSm")

@@ -125,7 +125,7 @@ class BrakingStop:
         return tuple(self.setting("reference", method, SAMPLE / n) for method, some in chosen.items() for n in some)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting by its curve and the longest step (s) up to ``value`` that divides a sample."""
+        """A setting: curve, and the longest step (s) up to ``value`` that divides a sample."""
         substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
         return Setting(
             engine, method, SAMPLE / substeps, ORDERS.get(method, 0), default=DEFAULTS.get((method, substeps), "")

@@ -82,7 +82,7 @@ class ContactAlone:
         )
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and 1 by its cells."""
+        """A setting of this problem: curve, and 1 / number of cells as its value."""
         cells = round(1.0 / value)
         usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)

@@ -66,7 +66,7 @@ def attitude(times: np.ndarray) -> np.ndarray:
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
-    """Local rates (n, 3) in rad/s at times (n,) in s: what a gyro without errors measures."""
+    """Angular rates (n, 3) in rad/s in body axes at times (n,) in s, as an ideal gyro measures them."""
     (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (part.T for part in angles(times))
     return np.column_stack(
         [

@@ -162,7 +162,7 @@ class RollingWheels:
         return curves
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and its step (s) or tolerance."""
+        """A setting of this problem: curve, and step (s) or tolerance."""
         made = setting(engine, method, value)
         kept = made.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made if kept else replace(made, order=0, nominal=made.order)

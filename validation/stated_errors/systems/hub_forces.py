@@ -74,7 +74,7 @@ def _sample(scene: HubScene, engine: str) -> Sample:
 
 
 def _run_with_error(scene: HubScene, engine: str) -> Result:
-    """The run with its stated error, also if the run's result is refused."""
+    """The run with its stated error; if the run fails on the way, its partial result."""
     try:
         return run(scene, engine, error=True)
     except RunFailed as error:
