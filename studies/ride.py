@@ -112,8 +112,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """Cases of road correlation: the scene's own, then simpler ones. A wheel in the middle belongs to neither of two
-    independent tracks, so such a case is left out."""
+    """Cases of road correlation: the scene's own, then simpler ones. Independent tracks are left out for a vehicle with
+    wheels both in the middle and at the sides, as a middle wheel is on neither track."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)

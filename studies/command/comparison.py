@@ -94,8 +94,8 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    """Result files of a folder by name. If there are netCDF files, CSV files count only where they are not a copy of
-    one."""
+    """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too. If there are
+    none, the CSV files."""
     files = [
         path
         for path in sorted(folder.rglob("*"))
