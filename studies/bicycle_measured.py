@@ -59,7 +59,7 @@ def measured(
 
 
 def lines(answer: BicycleObservations, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
-    """The answer as text."""
+    """Text of the measured and predicted weave."""
     told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
     for seen in answer.seen:
         mean, deviation, model = seen.mean, seen.deviation, predicted(bicycle, base, seen)

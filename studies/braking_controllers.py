@@ -120,7 +120,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
-    """One line per run."""
+    """Table of the stops with a line per run."""
     heads = [*SHOWN_QUANTITIES, LOCKED]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for stop in stops:
@@ -149,7 +149,7 @@ PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "fi
 
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
-    """Bars by procedure, a column of panels per surface, one colour per controller."""
+    """Bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
     from studies.braking_figures import plain_name
 

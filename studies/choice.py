@@ -141,7 +141,7 @@ def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
 
 
 def search_text(scene: Any) -> str:
-    """Text on the number of runs that a search for a scene's choice may take."""
+    """Text on how many runs the search for a scene's choice may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
 
@@ -249,7 +249,7 @@ def _save(choice: SceneChoice, path: Path) -> None:
 
 
 def percent(value: float) -> str:
-    """A relative change in words."""
+    """A relative change as text."""
     digits = ".2g" if abs(value) < 0.1 else ",.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
@@ -259,14 +259,14 @@ def _change_text(change: float, beside: float) -> str:
 
 
 def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
-    """Why an effect stays whose going would change quantities by so much, with all that went."""
+    """Text on why an effect stays: how much the quantities would change if it were left out as well."""
     if change > BUDGET * scene_choice.scene.tolerance or scene_choice.watts or scene_choice.choice.ended:
         return f"would matter no more at a tolerance above {percent(change)}"
     return f"stays at {percent(change)}: steps would have to be shorter for it to go, or whole runs did not confirm it"
 
 
 def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
-    """The choice in words."""
+    """Text of the choice."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
         f"  {scene.title} ({scene.system}, {scene_choice.engine})" if named else f"  by {scene_choice.engine}",

@@ -63,7 +63,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _table(scene: ContactScene, forces: Result) -> list[str]:
-    """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep."""
+    """Lines on the normal contact, then forces with their errors: all for a single creepage, or some rows of a
+    sweep."""
     rolls: Rolls = forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load

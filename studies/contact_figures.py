@@ -173,7 +173,8 @@ LARGEST_ERROR = 60.0
 
 
 def price_figure(price: Result, title: str) -> Figure:
-    """Error of every theory over its cells and over its time, all logarithmic; bars reach to 95 of 100 contacts.
+    """Plot the error of every theory over its number of cells and over its time, on logarithmic axes. Bars reach up to
+    the error that 95 of 100 contacts do not exceed.
 
     FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
     """

@@ -66,7 +66,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _table(points: list[TheoryPoint], count: int, uncertain: float) -> list[str]:
-    """All points, then the cheapest for each target."""
+    """Table of all theories and numbers of cells, then the cheapest for each target error."""
     return [
         f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
         f"{100 * uncertain:.2g} %)",

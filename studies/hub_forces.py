@@ -75,7 +75,8 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
 
 
 def save(comparison: Comparison, folder: Path) -> None:
-    """The measurement as a user would give it, and every run: ``runs.nc``, and its chassis as ``runs.csv``."""
+    """Save the measurement as a user would have it, and every run: ``runs.nc``, and the chassis' motion as
+    ``runs.csv``."""
     measurement = comparison.measurement
     names = [
         (f"{hub}_{name}", next(iter(units))) for hub in measurement.vehicle.hubs for name, units in COMPONENTS.items()

@@ -245,7 +245,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
 
 
 def _figure_curve(curve: CubicSpline) -> Any:
-    """Damage over a constant angle error."""
+    """Plot the damage error over a constant angle error."""
     from models.drawing.drift import NAMES
     from models.drawing.figures import heading, subplots
 

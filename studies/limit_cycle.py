@@ -82,7 +82,7 @@ def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
 
 
 def _branch_lines(orbits: list[Orbit]) -> list[str]:
-    """Every cycle of the branch."""
+    """Lines of text, one for each limit cycle of the branch."""
     if not orbits:
         return []
     lines = [
@@ -99,7 +99,7 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
 
 
 def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
-    """Amplitude, frequency, forces and power of the cycle in every implementation."""
+    """Lines on amplitude, frequency, forces and power of the limit cycle in every engine."""
     if not cycles:
         return []
     first = next(iter(cycles.values()))

@@ -261,7 +261,7 @@ def _lines(source: Source, p: Parameters) -> list[str]:
 
 
 def _verdict(quality: Quality) -> str:
-    """The consistency figure in words."""
+    """Text on the consistency of the readings with rigid-body motion."""
     if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
     share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
@@ -276,7 +276,7 @@ def _verdict(quality: Quality) -> str:
 
 
 def _closing(options: Options) -> list[str]:
-    """Closing lines: time that the filters take, and the damage error by a tilt."""
+    """Closing lines on the time that the filters take, and on the damage error that a tilt causes."""
     far = float(tilt_displacement(TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
@@ -333,7 +333,7 @@ def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: s
 
 
 def _errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
-    """Draw the largest error of each method up to every time, on a logarithmic scale."""
+    """Plot the largest error of each method up to every time, on a logarithmic scale."""
     for way, error in errors.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
     axis.set_title(title)

@@ -136,7 +136,8 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 
 
 def _save(results: Mapping[str, Result], folder: Path) -> None:
-    """Deviations of every engine over case, speed and output; the last speed is that of the tables."""
+    """Save the standard deviations of every engine over case, speed and output; the last speed is that of the
+    tables."""
     whole = join_results(results, "engine")
     saved = inherited(Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices")
     saved.save(folder / "deviations.nc")

@@ -38,7 +38,8 @@ class Options(Samples):
 
 @dataclass(frozen=True)
 class EffectAlone:
-    """One effect left out alone: predicted and confirmed changes (quantities,); why it may not, else empty."""
+    """One effect that is left out alone: predicted and confirmed changes (quantities,), and the reason why it may not
+    be left out (else empty)."""
 
     effect: Effect
     predicted: np.ndarray

@@ -130,7 +130,7 @@ def _table(answer: Nonlinear, speed: float) -> list[str]:
 
 
 def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
-    """Errors of small motion and of statistical linearisation where the speed is among those of the sweep."""
+    """Text on the errors of small motion and of statistical linearisation, if the speed is one of the sweep's."""
     at = np.flatnonzero(np.isclose(answer.speeds, speed))
     if not len(at):
         return ""

@@ -99,7 +99,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
 
 
 def _figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
-    """Figures like the paper's 4 to 8."""
+    """Draw figures like 4 to 8 of the paper."""
     from models.drawing.figures import save
 
     save(_figure_measurement(measured_run), folder / "fig4_measurement.png")

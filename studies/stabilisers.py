@@ -109,7 +109,7 @@ def _line(row: Row, free: float) -> str:
 
 
 def _ratio(value: float | None) -> str:
-    """A damage ratio in six characters; none for a tumbled run."""
+    """Text of a damage ratio in at most six characters; "-" for a tumbled run, which has none."""
     return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}" if value < 1e3 else f"{value:.0e}"
 
 

@@ -113,7 +113,8 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
 
 
 def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
-    """The force-excited scene, the run on the road that left its forces, if any, and the largest force (N)."""
+    """The scene driven by forces; the run on the road from which they come, if there is one; and the largest force
+    (N)."""
     if "road" not in scene.effects:
         return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
@@ -146,7 +147,8 @@ def _ensemble(
 
 
 def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
-    """The result with the error of the steps, of the run without noise, and the standard error of the median."""
+    """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
+    median."""
     result.data.attrs["error"] = quiet.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
     middle, low, high = quantile(spread["drift_off"], 0.5)

@@ -93,7 +93,8 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
 
 
 def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
-    """Lateral displacement over time, a panel per speed; below, how far the engines are from the first one."""
+    """Plot lateral displacement over time, with a panel per speed, and below it the difference of each engine from the
+    first one."""
     paths: dict[str, dict[float, Motion]] = {
         engine: {speed: result.detail for speed, result in path_then.items()} for engine, path_then in results.items()
     }
@@ -120,7 +121,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 
 
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
-    """Creep forces on each wheel and their power in the last second of every path."""
+    """Plot creep forces on each wheel, and their power, over the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):

@@ -91,7 +91,7 @@ class Overlay:
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """Lines for the screen."""
+        """Lines of the comparison for the screen."""
         head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
         rows = [
             f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {_share(each.relative):>9} {each.peak:>11.4g}  "
@@ -130,7 +130,7 @@ def against(run: Path, measurement: Path) -> bool:
 
 
 def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
-    """Lay a measurement over a run, largest relative error first.
+    """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
     channel of each under a name. shift : s, what the measurement's clock shows at the run's time 0; sought where None.
@@ -218,7 +218,8 @@ def saved_results(place: Path) -> dict[str, Result]:
 
 
 def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
-    """Lay a measurement over the run or the runs of a folder, save ``compare.csv`` and figures, say it in lines."""
+    """Compare a measurement with a run, or with the runs in a folder; saves ``compare.csv`` and figures, and returns
+    the lines to print."""
     overlays = {name: overlay(run, measurement, shift) for name, run in saved_results(run_path).items()}
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
@@ -249,7 +250,7 @@ def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
 
 
 def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
-    """Draw measurement and run, and below their difference, of the channels of the largest relative error."""
+    """Plot the channels with the largest relative errors: measurement and run, and their difference below."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     shown = overlay.matches[:SHOWN_CHANNELS]

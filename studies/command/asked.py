@@ -53,7 +53,7 @@ def scene_path(name: str) -> Path:
 
 
 def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
-    """The study's module, once everything that can be refused before a run has been checked."""
+    """The module of a scene's study, after everything was checked that can be checked before a run."""
     module = study_of(scene)
     plan_of(scene).check(scene, engines)
     if hasattr(module, "check"):
@@ -86,7 +86,7 @@ def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
 
 
 def plan_of(scene: Any) -> Any:
-    """The module that describes and checks scenes of this one's system."""
+    """The module that describes and checks scenes of this scene's system."""
     return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 

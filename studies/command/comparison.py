@@ -42,7 +42,7 @@ def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[s
 
 
 def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences between two results in memory, which messages and notes call by ``names``."""
+    """Differences between two results in memory; ``names`` are their names in messages and notes."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
@@ -161,13 +161,14 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
 
 
 def _dimension_along(channel: Any) -> Any:
-    """The dimension that a channel is read along: time, or the longest whose entries are numbers or have no names."""
+    """Dimension along which a channel is compared: time, or else the longest one that has numbers, or no names, as
+    coordinates."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
 def _grid(channel: Any, along: Any) -> tuple[str, np.ndarray]:
-    """Name and values of the coordinate along a dimension; entries are counted where it has none."""
+    """Name and values of the coordinate along a dimension; row numbers if it has none."""
     if along not in channel.coords:
         return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
     unit = channel[along].attrs.get("units", "s" if along == "time" else "")
@@ -206,7 +207,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
 
 
 def _difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
-    """Raises InputError where kinds of runs, units or rows do not fit."""
+    """Difference of one quantity in two results; raises InputError if their kinds, units or rows do not match."""
     if first.kind != second.kind:
         raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
     if (first.unit, first.over) != (second.unit, second.over):
@@ -236,7 +237,8 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> Q
 
 
 def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
-    """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
+    """Difference of two runs with rows at different times; the denser run is interpolated at the other's rows by a
+    cubic spline."""
     from scipy.interpolate import CubicSpline
 
     fine, coarse = (first, second) if len(first.grid) > len(second.grid) else (second, first)
@@ -256,7 +258,7 @@ def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> Quan
 
 
 def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
-    """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
+    """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the lines to print."""
     differences, notes = compare(first, second)
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)

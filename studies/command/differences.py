@@ -71,7 +71,7 @@ class QuantityDifference:
 
     @property
     def at(self) -> float:
-        """Where on the grid the difference is largest."""
+        """Position on the grid at which the difference is largest."""
         return float(self.grid[self.row])
 
     @property
@@ -81,6 +81,6 @@ class QuantityDifference:
 
     @property
     def share(self) -> float:
-        """Largest difference by the largest magnitude of the first."""
+        """Ratio of the largest difference to the largest magnitude of the first result."""
         size = np.abs(self.first[np.isfinite(self.first)]).max(initial=0.0)
         return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf

@@ -85,7 +85,7 @@ def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
 
 
 def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
-    """Summary as a person reads it."""
+    """Print a summary for a human reader."""
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():
         steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)

@@ -83,7 +83,8 @@ def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, l
 def report(
     scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, all_profiles: bool, **more: Any
 ) -> dict[str, Any]:
-    """Identify, save ``identify.json`` and ``identify.png``, and say it in lines; every : profiles of all of them."""
+    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the lines to print. all_profiles :
+    profiles of all parameters."""
     known = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
     drawn = list(profiles_of(scene, known, all_profiles, tell))
     answer = as_dict(known, drawn)
@@ -227,7 +228,7 @@ def _combined(uncertainty: Uncertainty) -> list[str]:
 
 
 def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
-    """Every channel with the model at the estimates, the error below it."""
+    """Plot every measured channel with the model at the estimates, and the error below it."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     problem = uncertainty.fit.problem

@@ -108,7 +108,7 @@ def _engine(path: PurePath) -> str:
 
 
 def lines(spent: dict[str, float]) -> list[str]:
-    """The table that is printed: seconds and shares, the largest first."""
+    """Table to print with the seconds and shares of each kind of work, largest first."""
     whole = sum(spent.values())
     rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]
     return [f"  where {whole:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]

@@ -98,7 +98,7 @@ class Points:
         return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the points depend on: the scene as written, the files that it names, the code."""
+        """Everything on which the points depend: the scene as written, the files that it names, and the code."""
         path = scene_path(self.scene)
         table = changed(path, self.changes)
         return {

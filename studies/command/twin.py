@@ -79,7 +79,7 @@ class Twins:
 
     @property
     def alike(self) -> bool:
-        """Whether nothing differs."""
+        """Whether all builds agree with their files, and both files with each other."""
         files = all(each.certified for each in self.examined)
         return files and (self.comparison is None or self.comparison.alike)
 
@@ -97,7 +97,7 @@ def check_asked(files: Sequence[Path], page: Path | None) -> None:
 
 
 def kinds(text: str) -> tuple[str, ...]:
-    """Kinds of content in an option: names between commas."""
+    """The kinds of content that an option lists, separated by commas."""
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
@@ -135,7 +135,7 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
 
 
 def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
-    """Tell the share of one file as one of all."""
+    """Report the progress within one file as a share of that of all files."""
     tell(what, (number + share) / parts)
 
 
@@ -183,7 +183,7 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
 
 
 def lines(twins: Twins) -> list[str]:
-    """What the terminal shows."""
+    """Lines for the terminal."""
     rows = list[str]()
     for each in twins.examined:
         rows += _file_lines(each)
@@ -192,7 +192,7 @@ def lines(twins: Twins) -> list[str]:
 
 
 def verdict(each: Examined) -> str:
-    """One sentence on a file."""
+    """Sentence with the verdict on a file."""
     worst = max(row.acceleration for row in each.agreements)
     if each.misread:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"

@@ -118,7 +118,7 @@ def _remaining(share: float, seconds: float) -> float | None:
 
 
 def _time_left_text(seconds: float | None, spent: float) -> str:
-    """The time left in words, or the time so far where it is not known."""
+    """Text of the remaining time or, if it is unknown, of the elapsed time."""
     return f"{_duration_text(spent)} so far" if seconds is None else f"{_duration_text(seconds)} left"
 
 

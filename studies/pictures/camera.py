@@ -34,7 +34,7 @@ class Camera:
 
     @cached_property
     def axes(self) -> np.ndarray:
-        """Rows: to the right, up, back to the spectator."""
+        """Unit vectors (3, 3) of the camera as rows: right, up, and from the target back to the camera."""
         back = np.subtract(self.eye, self.target)
         back /= np.linalg.norm(back)
         right = np.cross(self.up, back)
@@ -85,7 +85,7 @@ def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, heig
 def _shaded(
     camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, depths and colours for ``paint``, of the triangles that lie before the eye."""
+    """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
     corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]

@@ -63,7 +63,7 @@ def draw(path: Path) -> Path:
 
 
 def _run(engine: str, method: str, step: float) -> Result:
-    """A run by one method at one step."""
+    """A run by one method with one step."""
     scene = build(SCENE | {"engines": {engine: {"integrator": method, "step": step}}})
     return run(scene, engine)
 

@@ -147,5 +147,5 @@ def difference(motions: list[FilmedMotion]) -> str:
 
 
 def eight_bits(image: np.ndarray) -> np.ndarray:
-    """Colours from 0 to 1 as bytes."""
+    """Colours from 0 to 1 converted to bytes."""
     return (255.0 * image.clip(0.0, 1.0) + 0.5).astype(np.uint8)

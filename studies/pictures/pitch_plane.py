@@ -86,7 +86,7 @@ def _offset(assembly: Assembly, body: str) -> np.ndarray:
 
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """The road's forces on the wheels and the suspension's on the chassis."""
+    """Arrows of the road's forces on the wheels and of the suspension's forces on the chassis."""
     up, (places, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])

@@ -211,7 +211,7 @@ def rests(now, first, step, truck):
 
 @inlined
 def moved_state(now, time, known):
-    """Move the state from the start of a step on by a time (s)."""
+    """Advance the state by a time (s) from the start of the step."""
     state, first, accelerations = now.state, known.first, now.accelerations
     for a in range(3):
         state[3 + a] = first[3 + a] + time * accelerations[a]

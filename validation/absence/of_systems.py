@@ -192,7 +192,8 @@ def measured_counts() -> dict[str, Any]:
 
 
 def rows(quick: bool) -> list[Row]:
-    """Absence of every effect of every system, and a positive control of each; quick: of every third, in one engine."""
+    """Report rows: absence of every effect of every system, and a positive control of each; quick: every third effect,
+    in one engine."""
     if quick:
         return [
             row

@@ -85,7 +85,7 @@ def installed() -> int:
 
 
 def march(engine: str, model: Model) -> MarchCounts:
-    """Run a model once and watch its engine march; the guard and the results around it are not counted."""
+    """Run a model once and count what its engine's march uses; the guard and the making of results are not counted."""
     seen = MarchCounts()
     with _entry(engine, seen):
         model.run()
