@@ -49,7 +49,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _with_progress(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
-    """The frames, each of which moves the progress bar."""
+    """Yield the frames; each one advances the progress bar."""
     for k, frame in enumerate(frames):
         progress(f"frame {k + 1} of {count}", RUN + (1.0 - RUN) * k / count)
         yield frame

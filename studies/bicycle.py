@@ -72,7 +72,7 @@ def _line(engine: str, result: Result) -> str:
 
 
 def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: dict[str, Result], path: Path) -> Path:
-    """Eigenvalues over speed, and lean and steer angle over time."""
+    """Plot the eigenvalues over speed, and lean and steer angle over time."""
     drawn, axes = panels(4, 2, 2.4)
     for axis, part in ((axes[0], values.real), (axes[1], values.imag)):
         axis.plot(speeds, part, ".", ms=2.0, color=DARK)

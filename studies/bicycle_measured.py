@@ -25,8 +25,9 @@ FEEDBACK = Control(gain=2.0, until=6.5)
 
 @dataclass(frozen=True, eq=False)
 class BicycleObservations:
-    """Observations of all speeds; the choice on some of them; predictions by it of the speeds that took no part, and of
-    each speed by a choice on all others, where none was asked to stand aside: (mean (2,), deviations (2,)) by speed."""
+    """Measured weave at all speeds, the suspects that were chosen, and predicted weave. A prediction, by speed, is a
+    mean (2,) and standard deviations (2,). It is made for each speed that was not used in the choice; if all were used,
+    each speed is predicted by a choice on all the others."""
 
     seen: list[Observation]
     choice: Choice
@@ -36,7 +37,8 @@ class BicycleObservations:
 def measured(
     folder: str | Path, choose: Sequence[float] = (), bicycle: Whipple | None = None, base: Control = FEEDBACK
 ) -> BicycleObservations:
-    """Choose suspects on the speeds ``choose`` (m/s), all if there are none, and predict the others; InputError."""
+    """Choose suspects from the measurements at the speeds ``choose`` (m/s, all by default), and predict weave at the
+    other speeds; raises InputError."""
     seen, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in seen]
     for speed in choose:
@@ -57,7 +59,7 @@ def measured(
 
 
 def lines(answer: BicycleObservations, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
-    """The answer as text."""
+    """Text of the measured and predicted weave."""
     told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
     for seen in answer.seen:
         mean, deviation, model = seen.mean, seen.deviation, predicted(bicycle, base, seen)

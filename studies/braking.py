@@ -83,21 +83,22 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 def rim_speed_differences(
     measured_pressures: MeasuredPressures | None, stop: Stop, rims: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Differences by which the speeds of rims (n, W) in m/s differ from measured ones, if there are any."""
+    """Rms differences between the computed and the measured rim speeds (m/s); empty if none were measured. rims (n, W):
+    computed rim speeds of the W wheels in m/s."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
     return {"rim less measured, rms [m/s]": measured_pressures.rms(stop.times, rims)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
-    """A line if the run lasts longer than its measured pressures."""
+    """A line that warns if the run lasts longer than its file of measured pressures."""
     if measured_pressures is None or measured_pressures.times[-1] > stop.times[-2]:
         return []
     return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
 def compared(results: dict[str, Result]) -> list[str]:
-    """A line per engine: where it stopped, and how long that took."""
+    """A line per engine: position and yaw at which the vehicle stopped, stopping time, and computing time."""
     rows = []
     for engine, result in results.items():
         path = result.detail
@@ -111,7 +112,7 @@ def compared(results: dict[str, Result]) -> list[str]:
 
 
 def lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
-    """Tables of one procedure: of the vehicle, and of its wheels."""
+    """Text for one procedure: a table of figures for the vehicle, and a table with a column per wheel."""
     rest = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
     unfinished = "" if stop.path.stands else f": not stopped by {stop.times[-1]:g} s, {rest}"
     rows = [f"  {name.replace('_', ' ')}{unfinished}"]

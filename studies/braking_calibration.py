@@ -111,7 +111,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
-    """The scene with another friction and steer angle; RunFailed where the fit leaves what is possible."""
+    """The scene with another friction and steer angle; raises RunFailed if the fit has left the possible range of
+    these."""
     if not (0.05 < scale < 2.0 and steer < 1.0):
         raise RunFailed("calibration", f"the fit diverges: friction times {scale:.3g}, steer angle {steer:.3g} rad")
     procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
@@ -133,7 +134,7 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
 
 
 def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
-    """Lines: the fitted parameters, and each figure beside the paper's."""
+    """Lines with the fitted parameters, and with each figure next to the paper's value."""
     lines = [
         f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
         f"  means of {options.last} stops, +- the scatter of one",

@@ -56,7 +56,8 @@ LABELS = ("surface", "procedure", "controller")
 
 
 def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
-    """All runs by their labels, surface by surface: the scene of each alone."""
+    """The scene of every single run: for each surface, all procedures, each with every controller and, if there is a
+    trailer, without and with it. Keys: surface, procedure, label of the controller."""
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
     return {
@@ -87,7 +88,7 @@ def _single_procedure(
 
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
-    """Refuse what a controller or a surface cannot be."""
+    """Raise InputError for options of a controller or a surface that are impossible."""
     check_reference(scene, engines)
     for alone in cases(scene).values():
         check_scene(alone, ("reference",))
@@ -119,7 +120,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
-    """One line per run."""
+    """Table of the stops with a line per run."""
     heads = [*SHOWN_QUANTITIES, LOCKED]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for stop in stops:
@@ -129,7 +130,7 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
 
 
 def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
-    """Save the stops: a line of a table each, and a result with an axis of stops and the assumptions that any of them
+    """Save the stops: a CSV line for each, and a result with an axis of stops. It holds the assumptions that any stop
     broke."""
     heads = [*SHOWN_QUANTITIES, LOCKED] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
@@ -148,7 +149,7 @@ PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "fi
 
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
-    """Bars by procedure, a column of panels per surface, one colour per controller."""
+    """Bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
     from studies.braking_figures import plain_name
 

@@ -52,7 +52,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Two ensembles; saves each by its name, as netCDF and as CSV, and ``ensemble.png``."""
+    """Run two ensembles; saves each under its name as netCDF and CSV, and ``ensemble.png``."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]

@@ -40,8 +40,8 @@ OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 def stop_figure(
     scene: BrakingScene, name: str, results: Results, file: File, measured_pressures: MeasuredPressures | None = None
 ) -> File:
-    """Panels of the first result: speeds, slips, pressures, torques, the path; motion to the side where there is any,
-    and of a vehicle on its suspension also its body's lean, and loads."""
+    """Plot the stop of the first engine over time: speeds, slips, pressures, torques; and the path from above. Lateral
+    motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a suspension."""
     procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
     aside, lean = _moves_aside(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
@@ -84,7 +84,7 @@ SPELT = {
 
 
 def plain_name(name: str) -> str:
-    """Name of a procedure or a controller as readers write it."""
+    """Name of a procedure or controller with spaces or in its usual spelling, for titles and labels."""
     return SPELT.get(name, name.replace("_", " "))
 
 
@@ -93,7 +93,7 @@ STRAIGHT = 0.05
 
 
 def _moves_aside(stop: Stop) -> bool:
-    """Whether a vehicle turns, or is pushed, to the side."""
+    """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST
     turned = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
     return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
@@ -118,7 +118,7 @@ def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label
 
 
 def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
-    """Roll and pitch (n, 2) in rad of the body."""
+    """Plot roll and pitch (n, 2) in rad of the body over time."""
     for values, colour, label in zip(
         np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
     ):
@@ -128,7 +128,7 @@ def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
 
 
 def _angles(axis: Axes, stop: Stop) -> None:
-    """Yaw, side slip and, of a train, the hitch."""
+    """Plot the yaw and side-slip angles over time and, for a train, the hitch angle."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color=VERMILION, label="side slip")
@@ -139,8 +139,8 @@ def _angles(axis: Axes, stop: Stop) -> None:
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
-    """Unit and corners (m, 2) in m in its axes: of the truck, the drawbar and the trailer's body, or of a vehicle on
-    its suspension and what it tows, each with a line to its hitch."""
+    """Outlines to draw, as unit number and corners (m, 2) in m in the unit's axes. They show truck, drawbar and
+    trailer, or a vehicle on its suspension and what it tows, each with a line to its hitch."""
     truck, trailer = vehicle_of(scene), scene.trailer
     boxes = [(0, _box(truck.front.x, truck.rear.x))]
     if trailer is not None:
@@ -155,7 +155,8 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
 
 
 def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
-    """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
+    """Positions (m, 2) on the road of points that are fixed to a unit. positions (2 + U,): x, y (m) of the vehicle and
+    the yaw angles of its U units."""
     return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
@@ -167,7 +168,7 @@ def _box(front: float, rear: float) -> np.ndarray:
 
 
 def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
-    """The path from above with the vehicle's outline now and then, on its surfaces."""
+    """Draw the path from above on the road's surfaces, with the vehicle's outline at a few moments."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     plane, drawn = plane_of(scene), outlines(scene)

@@ -36,8 +36,9 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """One effect: predicted changes (quantities,) if it alone is left out, inf where it cannot be; what it saves: work
-    of the scene with longer steps alone, divided by that of what is left at the longest step that is then allowed."""
+    """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
+    saving. saved: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
+    effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
@@ -46,8 +47,9 @@ class SingleEffect:
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """A scene's choice, effects one by one, tolerances above which effects that stay would go, energy activity (W) by
-    element where it has a closed form; results of what is left, with their errors."""
+    """The choice of effects for one scene, with each effect taken alone. further: tolerances above which effects that
+    stay would be left out too. watts: energy activity (W) by element, where it has a closed form. results: runs of the
+    reduced scene, with their errors."""
 
     scene: Any
     engine: str
@@ -73,7 +75,7 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose; saves ``SYSTEM.csv`` of every scene and a figure."""
+    """Choose effects of the scenes; saves ``SYSTEM.csv`` for each scene, and a figure."""
     check(scene, engines)
     beside = [load_scene(name, None) for name in scene.options.get("beside", [])]
     return save_choices([scene, *beside], engines, folder, progress)
@@ -102,7 +104,8 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
 
 
 def _results(choices: list[SceneChoice]) -> dict[str, Result]:
-    """Results of what is left of each scene, by what tells them apart."""
+    """Results of the reduced scenes of all choices, each under a name of its system (if there are several) and run
+    number."""
     return {
         " ".join(
             (
@@ -116,12 +119,13 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
 
 
 def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Pass on what is spent of a scene's search, after some of so many scenes."""
+    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the present
+    one."""
     progress(title, (completed + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
-    """Whether a scene's choice needs no runs."""
+    """Whether a scene's choice needs no runs in time."""
     if scene.system != "ride":
         return False
     from models.systems.ride.of_scene import goes_in_time
@@ -130,13 +134,14 @@ def has_closed_form(scene: Any) -> bool:
 
 
 def engine_of(scene: Any, engines: tuple[str, ...]) -> str:
-    """The implementation that was asked for, or the system's usual one."""
+    """The system's usual engine if it is among the requested ones or none is requested; else the first requested
+    one."""
     usual: str = system_of(scene).ENGINE
     return usual if not engines or usual in engines else engines[0]
 
 
 def search_text(scene: Any) -> str:
-    """Text on the number of runs that a search for a scene's choice may take."""
+    """Text on how many runs the search for a scene's choice may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
 
@@ -154,7 +159,7 @@ def search_text(scene: Any) -> str:
 
 
 def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> SceneChoice:
-    """A scene's choice by one implementation."""
+    """The choice for a scene in one engine."""
     engine = engine_of(scene, engines)
     with Crew.of(scene, usual=1).at_work(TOGETHER, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
@@ -168,7 +173,8 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
 
 
 def _linear(scene: Any) -> SceneChoice:
-    """The choice for a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
+    """The choice for a linear stationary ride scene by its closed form; numbers of calls are for one second of
+    motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
     from models.systems.ride.of_scene import scene_errors
@@ -228,7 +234,8 @@ def _answer(answered: SceneChoice) -> dict[str, Any]:
 
 
 def _save(choice: SceneChoice, path: Path) -> None:
-    """A row per effect: what leaving it out alone changes, what that saves, and whether it was left out."""
+    """Save a CSV file with a row per effect: the changes if it alone is left out, what this saves, and whether it was
+    left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
@@ -242,7 +249,7 @@ def _save(choice: SceneChoice, path: Path) -> None:
 
 
 def percent(value: float) -> str:
-    """A relative change in words."""
+    """A relative change as text."""
     digits = ".2g" if abs(value) < 0.1 else ",.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
@@ -252,14 +259,14 @@ def _change_text(change: float, beside: float) -> str:
 
 
 def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
-    """Why an effect stays whose going would change quantities by so much, with all that went."""
+    """Text on why an effect stays: how much the quantities would change if it were left out as well."""
     if change > BUDGET * scene_choice.scene.tolerance or scene_choice.watts or scene_choice.choice.ended:
         return f"would matter no more at a tolerance above {percent(change)}"
     return f"stays at {percent(change)}: steps would have to be shorter for it to go, or whole runs did not confirm it"
 
 
 def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
-    """The choice in words."""
+    """Text of the choice."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
         f"  {scene.title} ({scene.system}, {scene_choice.engine})" if named else f"  by {scene_choice.engine}",
@@ -302,7 +309,8 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
 
 
 def misleading_activities(choice_of: SceneChoice) -> list[str]:
-    """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
+    """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
+    quantity."""
     total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
     for effect in choice_of.alone:
         share = choice_of.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
@@ -316,7 +324,7 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
 
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
-    """A panel per scene; one more for the activity of those that have it."""
+    """Figure with a panel per scene, and another panel for energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, heading, save, subplots
 
     shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
@@ -332,7 +340,7 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
 
 
 def _changes(axis: Any, scene_choice: SceneChoice) -> None:
-    """Changes of every quantity by leaving out each effect alone.
+    """Plot how much each quantity changes if each effect alone is left out.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
@@ -376,7 +384,8 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
 
 
 def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> str:
-    """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
+    """Name of an effect with "(left out)" or "(stays)". An effect that changes little alone may stay, since it can
+    matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
         " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"
     )

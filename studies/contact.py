@@ -63,7 +63,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _table(scene: ContactScene, forces: Result) -> list[str]:
-    """Normal contact, then forces with their errors: all of one creepage, or some rows of a sweep."""
+    """Lines on the normal contact, then forces with their errors: all for a single creepage, or some rows of a
+    sweep."""
     rolls: Rolls = forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load
@@ -106,7 +107,7 @@ NAMES = {
 
 
 def theory(method: Method) -> str:
-    """Name of the theory, and its cells."""
+    """Name of the contact theory, with its number of cells along each axis where it has cells."""
     return NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
@@ -115,7 +116,7 @@ def _percent(error: float, limit: float) -> str:
 
 
 def _lines_of_touches(scene: ContactScene) -> list[str]:
-    """Where profiles touch, a line each."""
+    """A line for each point at which the wheel's and the rail's profile touch."""
     if scene.profiles is None:
         return []
     return [
@@ -164,7 +165,8 @@ CHECKING_CELLS = 40
 
 
 def _checks(scene: ContactScene, rolls: Rolls) -> dict[int, Any]:
-    """The exact theory at a few motions of a sweep on an ellipse, by their numbers; it has constant friction."""
+    """Results of the exact theory, keyed by the motion's number, at a few motions of a sweep. Empty if the contact is
+    not a Hertzian ellipse, is exact already, or has falling friction."""
     body, points = rolls.contact, read(Options, scene.options, scene.file, "options").exact
     if not isinstance(body, OnEllipse) or isinstance(body, ExactOnEllipse) or scene_contact(scene).falling is not None:
         return {}

@@ -40,7 +40,8 @@ ARROWS = 17
 def contact_figure(
     patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
 ) -> None:
-    """Figure of pressure (its kind in the title) and tractions over the contact area, all patches to scale.
+    """Figure of the pressure and the tractions over the contact area, with all patches to scale; ``pressure`` is its
+    kind, for the title.
 
     forces : the result whose last motion is shown.
     """
@@ -80,7 +81,7 @@ def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
-    """Zones of stick and slip, and an arrow of the traction on the wheel every ``spacing`` (mm)."""
+    """Draw the zones of stick and slip, and arrows of the traction on the wheel every ``spacing`` (mm)."""
     largest = friction * max(float(f.pressure.max()) for f in patches)
     scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
     for f in patches:
@@ -98,7 +99,8 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
 
 
 def _arrows(f: Fields, spacing: float) -> Array:
-    """Position and traction (4, n) at points of an even net: in every so many rows of cells, and linear along each."""
+    """Positions and tractions (4, n) at evenly spaced points, which lie in some rows of cells and are interpolated
+    along them."""
     arrows, lines = list[Array](), f.y[:, 0]
     step = max(1, round(spacing / float(f.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
@@ -117,7 +119,7 @@ COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
 def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
-    """Forces and moment against a creepage, with the band of their error, and points of the exact theory.
+    """Plot forces and moment over a creepage, with their error band and some results of the exact theory.
 
     forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
     """
@@ -171,7 +173,8 @@ LARGEST_ERROR = 60.0
 
 
 def price_figure(price: Result, title: str) -> Figure:
-    """Error of every theory over its cells and over its time, all logarithmic; bars reach to 95 of 100 contacts.
+    """Plot the error of every theory over its number of cells and over its time, on logarithmic axes. Bars reach up to
+    the error that 95 of 100 contacts do not exceed.
 
     FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
     """
@@ -202,7 +205,8 @@ def price_figure(price: Result, title: str) -> Figure:
 
 
 def _priced(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
-    """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
+    """Plot the mean error (%) of one theory. An optional bar at its largest number of cells reaches up to the error
+    that 95 of 100 contacts do not exceed."""
     colour, marker = STYLES[name]
     mean, most = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"

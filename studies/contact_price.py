@@ -28,7 +28,7 @@ class Options(Strict):
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse what is no single ellipse, and keys that this study sets itself."""
+    """Raise InputError unless the contact is a single ellipse, or if the scene has keys that this study sets itself."""
     options = read(Options, scene.options, scene.file, "options")
     if scene.profiles is not None or scene.cases is not None:
         raise InputError(scene.file, scene.geometry, None, "this study needs an ellipse, curvatures or radii")
@@ -66,7 +66,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def _table(points: list[TheoryPoint], count: int, uncertain: float) -> list[str]:
-    """All points, then the cheapest for each target."""
+    """Table of all theories and numbers of cells, then the cheapest for each target error."""
     return [
         f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
         f"{100 * uncertain:.2g} %)",

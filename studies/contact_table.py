@@ -17,7 +17,7 @@ Progress = Callable[[str, float], None]
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
-    """Refuse a scene of one contact, and a file that is not there."""
+    """Raise InputError for a scene of a single contact, and for a missing file."""
     if scene.cases is None:
         allowed = "needs the table [cases] with a file; one contact is what the study contact computes"
         raise InputError(scene.file, "study", scene.study, allowed)
@@ -43,7 +43,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def summary_lines(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """Printed lines on ``rows`` rows, of which some are wrong, from the file ``name``."""
+    """Lines for the screen on how many rows of the file ``name`` were computed, how many have errors, and the time
+    taken."""
     if rows == 0:
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"

@@ -130,7 +130,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 def _channels(
     times: np.ndarray, statistics: PathStatistics, saved_paths: int
 ) -> tuple[dict[str, Channel], dict[str, Channel]]:
-    """The first paths and the statistics of all, with their axes."""
+    """Channels of the saved result and their axes: the first few paths, and the statistics over all paths."""
     paths = {name: values[:saved_paths] for name, values in statistics.first.items()}
     units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
     channels = {
@@ -159,7 +159,8 @@ def _channels(
 def _with_errors(
     result: Result, first: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
 ) -> Result:
-    """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
+    """The ensemble's result with two errors: the step error, estimated on its first path, and the standard errors of
+    the standard deviations."""
     error = json.loads(first.data.attrs["error"])
     result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
     worst = {
@@ -176,12 +177,13 @@ def _with_errors(
 
 
 def _steepest(statistics: PathStatistics) -> Watched:
-    """Largest pitch (rad) of all paths at each time; of those that left all bounds it is none."""
+    """Largest pitch (rad) over all paths at each time, for the check of an assumption; not a number where no path
+    remains."""
     return {"any path": statistics.steepest}
 
 
 def _rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
-    """Standard deviation and its standard error of pitch and heave at the asked times."""
+    """Standard deviations of pitch and heave, with their standard errors, at the times that the options list."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
@@ -224,7 +226,7 @@ def _time(value: float) -> str:
 
 
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
-    """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
+    """Plot percentiles of the pitch error over time, and a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, heading, save, subplots

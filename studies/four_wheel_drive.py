@@ -23,7 +23,7 @@ Knots = list[list[float]]
 
 
 def controls() -> dict[str, Knots]:
-    """Steer, brake and drive from knot to knot, drawn once."""
+    """Random steer, brake and drive inputs, as values at given times."""
     random = np.random.default_rng(SEED)
     steer, drive, brake, at, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
     while at < DURATION - 4.0:
@@ -38,14 +38,14 @@ def controls() -> dict[str, Knots]:
 
 
 def driven() -> Drive:
-    """The drive in MuJoCo."""
+    """The drive, simulated in MuJoCo."""
     manoeuvre = {"speed": SPEED, "duration": DURATION, "front_brake": 0.6, **controls()}
     table = {"title": "a drive that is made", "system": "handling", "manoeuvres": {"drive": manoeuvre}}
     return run_handling(build(table), "mujoco").detail
 
 
 def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
-    """Columns (unit, values) as a logger on the car would write them."""
+    """Columns (unit, values) of the drive, as a logger in the car would write them."""
     every = round(1.0 / (RATE * float(drive.run.times[1] - drive.run.times[0])))
     ahead, aside, yaw = drive.velocity().T
     random = np.random.default_rng(SEED + 1)

@@ -17,7 +17,8 @@ DIFFERENCE = "largest difference of the engines"
 
 
 def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Drive every manoeuvre in every engine; saves NAME.nc and NAME.png of each, by the first engine that ended."""
+    """Drive every manoeuvre in every engine; saves NAME.nc and NAME.png for each, from the first engine whose run
+    succeeded."""
     from studies.handling_figures import manoeuvre_figure
 
     failed, lines, answer, results = dict[str, str](), list[str](), dict[str, Any](), dict[str, Result]()

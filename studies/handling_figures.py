@@ -26,7 +26,7 @@ CORNERS = {
 
 
 def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
-    """Panels over time, the path and the friction circle of the first run; one colour for each tyre."""
+    """Plot a manoeuvre over time, its path and the friction circle of the first run, with one colour per tyre."""
     drive: Drive = next(iter(runs.values())).detail
     figure, axes = panels(8, 2, 2.15)
     over_time, (path_axis, circle_axis) = [axes[i] for i in (1, 2, 3, 4, 5, 6)], (axes[0], axes[7])
@@ -57,7 +57,7 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
 
 
 def _tyre_style(i: int) -> dict[str, Any]:
-    """Colour and line of a tyre by its number."""
+    """Line colour and line style of the tyre with this number."""
     return {"color": TYRES[i % 4], "linestyle": LINES[i // 4 % 4]}
 
 
@@ -74,7 +74,7 @@ def _path(axis: Axes, drive: Drive) -> None:
 
 
 def _circle(axis: Axes, drive: Drive) -> None:
-    """Forces of each tyre divided by mu N: inside of the unit circle."""
+    """Plot the force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
     bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)

@@ -75,7 +75,8 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
 
 
 def save(comparison: Comparison, folder: Path) -> None:
-    """The measurement as a user would give it, and every run: ``runs.nc``, and its chassis as ``runs.csv``."""
+    """Save the measurement as a user would have it, and every run: ``runs.nc``, and the chassis' motion as
+    ``runs.csv``."""
     measurement = comparison.measurement
     names = [
         (f"{hub}_{name}", next(iter(units))) for hub in measurement.vehicle.hubs for name, units in COMPONENTS.items()
@@ -95,7 +96,7 @@ def save(comparison: Comparison, folder: Path) -> None:
 
 
 def _write(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
-    """Samples of hub forces or angles, columns of these names and units."""
+    """Write sampled hub forces or angles to a CSV file, with a column for each name and unit."""
     columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
     write_time_series(path, columns, measured.period)
 

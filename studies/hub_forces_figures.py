@@ -26,14 +26,14 @@ LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and p
 
 
 def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
-    """Names, labels and colours of the runs that are drawn: of the free ones, which are alike, the last."""
+    """Name, label and colour of each run to draw. Of the free runs, which look alike, only the last is drawn."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
     rest = [(name, label) for name, label in LABELS.items() if name in comparison.runs]
     return [(name, label, COLOURS[name.split(",")[0]]) for name, label in (*free, *rest)]
 
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
-    """Roll, pitch, heading and position of every run, beside the true ones where these are known."""
+    """Plot roll, pitch, heading and position of every run over time, with the true ones where these are known."""
     figure, axes = subplots(2, 3, figsize=(COLUMN_WIDTH, 5.0), sharex=True)
     panels = [(name, name, 1e3, "mrad") for name in ("roll", "pitch", "heading")]
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
@@ -53,7 +53,8 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
 
 
 def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
-    """Damage of every section force, divided by the true one's, or without a truth by that of the filter's run."""
+    """Plot the damage ratio of every section force: damage divided by the true damage or, where this is unknown, by the
+    damage of the filter's run."""
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.6))
     shown, values = _drawn_runs(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):

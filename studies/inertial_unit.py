@@ -121,14 +121,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
-    """Angle errors (samples, seconds + 1) in rad of one grade, by its number."""
+    """Angle errors (samples, seconds + 1) in rad of the grade with this number."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
 
 
 def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
-    """Largest angle error (rad) of each grade over the longest drive, and the damage error that KEEPING_SHARE of its
-    units keep, with the standard error of that."""
+    """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
+    KEEPING_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
     worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
     kept = [quantile(each, KEEPING_SHARE) for each in worst]
@@ -154,7 +154,7 @@ def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline)
 
 
 def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
-    """Standard deviation (deg) of one grade's angle error by its law, after some times (s)."""
+    """Standard deviation (deg) of a grade's angle error by its law at times (s)."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return np.degrees(angle_variance(seconds, walk, 0.0, drift, options.correlation_time) ** 0.5)
 
@@ -162,7 +162,8 @@ def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
 def _row(
     options: Options, grade: int, minutes: float, every_angle: np.ndarray, curves: dict[str, CubicSpline]
 ) -> dict[str, Any]:
-    """One grade over one duration: angle error by law and measured, damage error per engine."""
+    """Results for one gyro grade over one duration: angle error by the law and by measurement, and damage error per
+    engine."""
     end = round(60 * minutes)
     angles = every_angle[:, : end + 1]
     worst = {engine: np.abs(damage_errors(curve, angles)).max(axis=1) for engine, curve in curves.items()}
@@ -179,8 +180,8 @@ def _row(
 
 
 def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
-    """Duration in minutes -> coarsest grade (deg/h) of which KEEPING_SHARE of all units keep the allowed damage
-    error."""
+    """For each duration in minutes, the coarsest grade (deg/h) of which the share KEEPING_SHARE of units keeps the
+    allowed damage error."""
     cheapest_grades: dict[str, float | None] = {}
     for minutes in options.durations:
         judged = (row for row in rows if row["minutes"] == minutes and row["damage error"])
@@ -221,7 +222,7 @@ def _percent(share: float) -> str:
 
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
-    """Angle error and damage error over the length of the drive, a line per grade."""
+    """Plot angle error and damage error over the length of the drive, with a line for each gyro grade."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
@@ -244,7 +245,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
 
 
 def _figure_curve(curve: CubicSpline) -> Any:
-    """Damage over a constant angle error."""
+    """Plot the damage error over a constant angle error."""
     from models.drawing.drift import NAMES
     from models.drawing.figures import heading, subplots
 

@@ -28,7 +28,7 @@ class Options(Strict):
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
-    """Refuse what has no limit cycle or no range."""
+    """Raise InputError for a scene without a limit cycle or a range of speeds."""
     if scene.contact.law == "linear":
         allowed = "without bound on the creep forces only flanges hold the motion: use fastsim"
         raise InputError(scene.file, "contact.law", scene.contact.law, allowed)
@@ -77,12 +77,12 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
-    """Plain numbers in SI."""
+    """Numbers of a limit cycle as plain values in SI."""
     return {name: float(getattr(orbit, name)) for name in names}
 
 
 def _branch_lines(orbits: list[Orbit]) -> list[str]:
-    """Every cycle of the branch."""
+    """Lines of text, one for each limit cycle of the branch."""
     if not orbits:
         return []
     lines = [
@@ -99,7 +99,7 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
 
 
 def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
-    """Amplitude, frequency, forces and power of the cycle in every implementation."""
+    """Lines on amplitude, frequency, forces and power of the limit cycle in every engine."""
     if not cycles:
         return []
     first = next(iter(cycles.values()))

@@ -81,7 +81,7 @@ def _report_progress(progress: Progress, scene: WheelRailScene, k: int, shift: f
 
 
 def _save(name: str, result: Result, folder: Path) -> None:
-    """The result, a row for each position, and a row for each patch of each wheel."""
+    """Save the result, with a CSV row for each position and another file's row for each patch of each wheel."""
     result.save(folder / f"{name}.nc")
     result.save_table(folder / f"{name}.csv", *POSITION)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH.items()}}
@@ -97,7 +97,7 @@ def _save(name: str, result: Result, folder: Path) -> None:
 
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
-    """A column for each wheel; the bars in the first row are the patches' widths."""
+    """Plot the contact patches, with a column of panels per wheel; bars in the first row show the patches' widths."""
     from models.drawing.figures import COLUMN_WIDTH, TURNS, heading, legend_below, save, subplots
 
     drawn, axes = subplots(len(PANELS), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")

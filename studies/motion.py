@@ -144,7 +144,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
 
 
 def _array(scene: Scene, positions: dict[str, tuple[float, float, float]]) -> SensorArray:
-    """The scene's sensors as an array; what is wrong with them is told under the scene's own name."""
+    """The scene's sensors as an array. An InputError about them names the scene's file and the sensors' key."""
     try:
         return sensor_array(positions)
     except InputError as error:
@@ -178,7 +178,8 @@ def _run(scene: Scene, engine: str, folder: Path) -> Source:
 
 
 def _recover(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
-    """Every way from readings to motion, without a sensor that does not belong to the body."""
+    """Recover the motion by every method. A suspect sensor, whose readings do not fit a rigid body, is used by the
+    first method only."""
     source.quality = quality(array, source.readings, p.deviation)
     suspect, readings = source.quality.suspect, source.readings
     moved = partial(motion, period=source.period, start=source.start, zeroed=options.zeroed)
@@ -203,7 +204,8 @@ def _values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
 
 
 def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
-    """Recovered pitch, rate and heave: a file of every way, and all of them as a result, which is returned."""
+    """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
+    returned."""
     stem, ways = Path(source.name).stem, {way: _values(moved) for way, moved in source.ways.items()}
     for way, moved_values in ways.items():
         columns = {name: (CHANNELS[name][1], values) for name, values in moved_values.items()}
@@ -226,7 +228,8 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
 
 
 def _numbers_of_ways(source: Source) -> dict[str, Any]:
-    """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
+    """Plain numbers of the recovered motion. They hold the share of misfit in the readings, the suspect sensor, and the
+    largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
     assert source.quality is not None
     ways = {}
     for way, moved in source.ways.items():
@@ -237,7 +240,7 @@ def _numbers_of_ways(source: Source) -> dict[str, Any]:
 
 
 def _lines(source: Source, p: Parameters) -> list[str]:
-    """Lines: the verdict on the readings, then one for each method."""
+    """Lines for the screen: the verdict on the readings, then the largest and rms error (or size) for each method."""
     assert source.quality is not None
     numbers, kind = _numbers_of_ways(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
@@ -258,7 +261,7 @@ def _lines(source: Source, p: Parameters) -> list[str]:
 
 
 def _verdict(quality: Quality) -> str:
-    """The consistency figure in words."""
+    """Text on the consistency of the readings with rigid-body motion."""
     if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
     share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
@@ -273,7 +276,7 @@ def _verdict(quality: Quality) -> str:
 
 
 def _closing(options: Options) -> list[str]:
-    """Closing lines: time that the filters take, and the damage error by a tilt."""
+    """Closing lines on the time that the filters take, and on the damage error that a tilt causes."""
     far = float(tilt_displacement(TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
@@ -285,7 +288,8 @@ def _closing(options: Options) -> list[str]:
 
 
 def _figure(source: Source, results: Results, path: Path) -> None:
-    """Pitch and heave of one source, what each way errs by where the truth is known, and the misfit of the readings."""
+    """Plot pitch and heave for one source of readings, the error of each method where the true motion is known, and the
+    misfit of the readings from rigid-body motion."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, heading, legend_below, save, subplot_mosaic
 
     assert source.quality is not None
@@ -315,7 +319,8 @@ def _figure(source: Source, results: Results, path: Path) -> None:
 
 
 def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str) -> None:
-    """The truth, on which good ways would only lie; every way where it is not known."""
+    """Plot the true motion where it is known, since good methods would only cover it; else the motion by each
+    method."""
     from models.drawing.figures import TRUTH
 
     if source.truth:
@@ -328,7 +333,7 @@ def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: s
 
 
 def _errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
-    """Draw the largest error of each method up to every time, on a logarithmic scale."""
+    """Plot the largest error of each method up to every time, on a logarithmic scale."""
     for way, error in errors.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
     axis.set_title(title)

@@ -44,7 +44,7 @@ class Options(Strict):
     )
 
     def asked(self) -> list[str]:
-        """Keys that are identified."""
+        """Keys of the parameters to identify."""
         return self.parameters or list(PARAMETERS if self.measurement else FITTED_PARAMETERS)
 
 
@@ -102,7 +102,8 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 
 
 def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[SingleTrackScene, SingleTrackScene]:
-    """Scenes of the stretch that is identified on and of the one that is predicted; their drives lie in ``folder``."""
+    """Scenes of the section of the drive for identification and of the section for prediction; their measured drives
+    are files in ``folder``."""
     if not options.measurement:
         whole, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
@@ -120,7 +121,7 @@ def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[
 
 
 def _found(scene: SingleTrackScene, name: str, place: str) -> Path:
-    """A file in TWINRIG_DATA, or as a scene names files."""
+    """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene resolves the name to."""
     data = os.environ.get("TWINRIG_DATA", "")
     return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
 
@@ -138,7 +139,7 @@ def _stretched(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
 def simpler(
     first: SingleTrackScene, second: SingleTrackScene, options: Options, name: str, progress: Progress
 ) -> Identified:
-    """The same with a vehicle of fewer numbers."""
+    """Identify and predict with a simpler vehicle: some of its parameters are fixed, and fewer are identified."""
     holds, kept = SIMPLER[name]
     parameters = [text for text in options.asked() if any(word in text for word in kept)]
     few = Search(parameters, list(AIMS), options.low_pass, blocks=2)
@@ -161,7 +162,8 @@ def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
 
 
 def figures(identified: Identified) -> dict[str, Any]:
-    """Per channel: rms error by the rms, share of what was measured inside the bands, their half-width by the error."""
+    """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
+    samples; half-width of the bands to the error."""
     sizes = np.array([channel.size for channel in identified.known.fit.problem.channels])
     crossed = np.sqrt(np.mean(identified.crossed**2, axis=1)) / sizes
     inside, width, relative = identified.bands.inside(), identified.bands.width(), identified.bands.relative()
@@ -190,7 +192,8 @@ def _told(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
 
 
 def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
-    """Per channel: correlation of the residual's magnitude, and of itself, with what the car does."""
+    """For each channel, correlations of the residual and of its magnitude with accelerations, speed and braking of the
+    car."""
     problem = identified.known.fit.problem
     model = problem.model.result(identified.known.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times

@@ -15,7 +15,7 @@ SECONDS = 60.0
 
 
 def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, path: Path) -> Path:
-    """Channels over time with bands, and below the errors of all vehicles."""
+    """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
     problem = chosen.bands.problem
     times = problem.clock.times
     shown = times <= times[0] + SECONDS

@@ -49,8 +49,8 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _failed(examination: Examination) -> dict[str, str]:
-    """Reasons why the command ends with code 1: errors in the recording, or a failed run of what was to be handed
-    on."""
+    """Reasons why the command ends with code 1: errors in the recording, or the failure of the run whose results were
+    to be saved."""
     if examination.stopped:
         count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
@@ -58,7 +58,7 @@ def _failed(examination: Examination) -> dict[str, str]:
 
 
 def _sizes(examination: Examination) -> dict[str, Any]:
-    """Largest magnitude and rms of what is handed on: what a sweep draws."""
+    """Largest magnitude and rms of each section force, as the numbers that a sweep plots."""
     sizes = dict[str, Any]()
     for answer, counted in examination.counted.items():
         assert examination.outcome is not None
@@ -68,7 +68,7 @@ def _sizes(examination: Examination) -> dict[str, Any]:
 
 
 def _lines_of_findings(examination: Examination) -> list[str]:
-    """Lines for the terminal: findings that matter, and how the runs ended."""
+    """Lines for the terminal: findings above a note, how each run ended, and the verdict on it."""
     lines = [
         f"  {finding.weight}: {finding.text}" for finding in gathered(examination.findings) if finding.weight != "note"
     ]

@@ -55,7 +55,7 @@ KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("sw
 
 
 def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
-    """Draw what a finding says into ``path``; None where there is nothing to draw."""
+    """Draw the figure that illustrates a finding into ``path``; None where there is nothing to draw."""
     telling = (f for f in evidence.faults if finding.check in KINDS.get(f.kind, ()))
     fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
@@ -71,7 +71,7 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
 
 
 def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str = "outside upper right") -> Path:
-    """Give a figure its title, the legend of an axis, and save it."""
+    """Add a title and the legend of one axis to a figure, and save it."""
     if legend is not None:
         columns = 3 if "lower" in place else 2
         drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
@@ -80,7 +80,7 @@ def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str =
 
 
 def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
-    """Signals over time, what is meant marked."""
+    """Plot the signals of a finding over time, with the time span that the finding is about marked."""
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
     end = min(marked[1] + MARKED_SECONDS if marked else UNMARKED_SECONDS, recording.duration)
@@ -108,7 +108,7 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
 
 
 def _means(evidence: Evidence, path: Path) -> Path:
-    """Mean vertical forces beside the static loads."""
+    """Bar chart of each hub's mean measured vertical force next to its static load by the vehicle file."""
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
     means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
@@ -126,8 +126,8 @@ def _means(evidence: Evidence, path: Path) -> Path:
 
 
 def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
-    """Figure of a channel's reading divided by its true value, over frequency: a delay is a slope of the phase, a
-    factor a level."""
+    """Plot the ratio of a channel's reading to its true value over frequency. A delay shows as a slope of the phase, a
+    wrong factor as a constant magnitude."""
     agreement = evidence.agreement
     assert agreement is not None
     for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
@@ -157,7 +157,8 @@ def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
 
 
 def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
-    """Unexplained shares of every reading, as mapped and exchanged."""
+    """Bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
+    exchanged."""
     agreement = evidence.agreement
     assert agreement is not None
     names = [s.name for s in agreement.outputs]
@@ -172,7 +173,7 @@ def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
 
 
 def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
-    """Draw the power density of signals beside their stated noise."""
+    """Plot the power spectral density of signals and the noise density that is stated for them."""
     from scipy.signal import welch
 
     recording = evidence.recording
@@ -192,7 +193,8 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
 
 
 def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values (m,) with the least and the greatest of every stretch, of as many as can be seen."""
+    """Times and values (m,) thinned for plotting: only the least and the greatest value of each short stretch of
+    samples stay."""
     width = len(times) // POINTS
     if width < 3:
         return times, values
@@ -206,7 +208,7 @@ def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
-    """A figure of rows over time."""
+    """Figure with rows of panels over time."""
     drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **more)
     for panel in panels[-1] if more.get("sharex") else panels.flat:
         panel.set_xlabel("time [s]")
@@ -214,7 +216,7 @@ def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
 
 
 def inputs_figure(examination: Examination, path: Path) -> Path:
-    """Forces at all hubs along each axis."""
+    """Plot the forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
     drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     times = recording.period * np.arange(recording.count)
@@ -230,7 +232,8 @@ def inputs_figure(examination: Examination, path: Path) -> Path:
 
 
 def drift_figure(examination: Examination, path: Path) -> Path:
-    """Roll and pitch of every run, beside what was measured and, of a virtual measurement, the truth."""
+    """Plot roll and pitch of every run together with the measured angles and, for a virtual measurement, the true
+    ones."""
     angles = examination.rig.angles
     drawn, panels = _timed(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
     for panel, angle in zip(panels[:, 0], angles, strict=True):
@@ -252,7 +255,7 @@ def drift_figure(examination: Examination, path: Path) -> Path:
 
 
 def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times (s) and values (rad) of an angle as measured, in every run, and in truth."""
+    """Times (s) and values (rad) of an angle: as measured, in every run, and, for a virtual measurement, true."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
     for signal in recording.find("angle", chassis, angle)[:1]:
@@ -265,7 +268,7 @@ def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray,
 
 
 def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
-    """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
+    """Plot up to six section forces over the complete recording, and each for two seconds about its largest range."""
     times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
     drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
     for (left, right), answer in zip(panels, answers, strict=True):
@@ -281,7 +284,7 @@ def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: 
 
 
 def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
-    """Level crossings and range pairs of some loads."""
+    """Plot level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
@@ -299,7 +302,8 @@ def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
 
 
 def overlay_figure(examination: Examination, run: SectionOutcome, compared: Sequence[Compared], path: Path) -> Path:
-    """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
+    """Plot measured channels that were not inputs of the run against the computed ones: over the whole time, and for
+    two seconds about the largest error."""
     drawn, panels = _timed(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
     for (left, right), each in zip(panels, compared, strict=True):
         times, measured, computed = overlay(examination.recording, run, each.signal, each.answer)

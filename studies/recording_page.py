@@ -72,8 +72,8 @@ def page(examination: Examination, folder: Path, result: Result) -> str:
 
 
 def _figures(examination: Examination, folder: Path) -> dict[str, Any]:
-    """Paths of the figures: of every finding that says more than a note and can be drawn, of what drives, of the runs,
-    and of the channels that were not put in."""
+    """Figures of the page: the input forces, every finding above a note that can be drawn, the drift of the runs, and
+    measured channels that were not inputs of the run."""
     figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
     figures["findings"] = [
         (finding, draw.figure(finding, examination.evidence, folder / f"finding_{i}.png"))
@@ -89,7 +89,8 @@ def _figures(examination: Examination, folder: Path) -> dict[str, Any]:
 
 
 def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
-    """The page's section on section forces: those that change, how many do not, and figures of the first ones."""
+    """Content of the page's section on section forces: counts of those that change, the number of those that do not,
+    and figures of the first few."""
     moving = {
         answer: counts
         for answer, counts in examination.counted.items()

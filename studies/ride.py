@@ -112,8 +112,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """Cases of correlation: the scene's, then simpler ones; a wheel in the middle is on neither of two tracks that are
-    independent."""
+    """Cases of road correlation: the scene's own, then simpler ones. Independent tracks are left out for a vehicle with
+    wheels both in the middle and at the sides, as a middle wheel is on neither track."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
@@ -123,7 +123,8 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
 
 
 def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
-    """The vehicle with the vertical acceleration of points along its heaviest body that pitches, if there is one."""
+    """The vehicle with added outputs: vertical accelerations at points along its heaviest body with pitch, if it has
+    one."""
     bodies = [body for body in vehicle.bodies if "ry" in body.freedoms and "z" in body.freedoms]
     if not bodies or len(vehicle.axles) < 2:
         return None
@@ -135,7 +136,8 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 
 
 def _save(results: Mapping[str, Result], folder: Path) -> None:
-    """Deviations of every engine over case, speed and output; the last speed is that of the tables."""
+    """Save the standard deviations of every engine over case, speed and output; the last speed is that of the
+    tables."""
     whole = join_results(results, "engine")
     saved = inherited(Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices")
     saved.save(folder / "deviations.nc")
@@ -143,7 +145,7 @@ def _save(results: Mapping[str, Result], folder: Path) -> None:
 
 
 def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: Path) -> None:
-    """The system at one speed for other programs."""
+    """Save the linear system at one speed for use in other programs."""
     from models.ride.covariance import stationary
     from models.ride.excited import excited
     from models.ride.export import save
@@ -154,7 +156,8 @@ def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: 
 
 
 def _answer(sweep: Sweep) -> dict[str, Any]:
-    """Standard deviations at all speeds in the scene's own case, SI; None where an output has none."""
+    """Standard deviation (SI) of each output at all speeds in the scene's own case; None in place of a value that is
+    not finite."""
     return {
         "speed": sweep.speeds[:-1].tolist(),
         "deviation": {
@@ -167,7 +170,8 @@ def _answer(sweep: Sweep) -> dict[str, Any]:
 def _table(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
-    """Table of each output's standard deviation at one speed, and the errors of simpler roads."""
+    """Table of each output's standard deviation at one speed, and how much it changes on roads with simpler
+    correlation."""
     (name, first), *others = sweeps.items()
     width = max(map(len, first.outputs))
     heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC))
@@ -193,13 +197,14 @@ def _table(
 
 
 def _value_without_rounding(deviations: np.ndarray) -> float:
-    """The scene's own of the deviations (cases,), 0 where symmetry leaves only rounding."""
+    """The scene's own of the standard deviations (cases,), or 0 if it is rounding of a value that vanishes by
+    symmetry."""
     largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
     return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING) else 0.0
 
 
 def _text(value: float, unit: str, status: str) -> str:
-    """A deviation with its unit, lengths in mm; the status where there is none."""
+    """Text of a standard deviation with its unit (mm for lengths), or its status if it is not finite."""
     if status != "finite":
         return status
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"
@@ -214,8 +219,8 @@ def _change(other: float, value: float) -> str:
 
 
 def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
-    """Lines on how often each travel passes the free travel (m), and on its rate where the vehicle file asks for its
-    rate."""
+    """Lines on the share of time for which each suspension travel exceeds the free travel (m). The number of
+    exceedances per hour is added if the vehicle file has the travel rate as an output."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []
@@ -231,7 +236,7 @@ def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_trav
 
 
 def _loads(vehicle: SpatialVehicle, deviations: Mapping[str, float]) -> list[str]:
-    """Dynamic wheel load factors in a line."""
+    """Line of text with the dynamic wheel load factors."""
     parts = [
         f"{name} {dynamic_load_factor(deviations[name], load):.3f}" if load > 0 else f"{name} has no load to carry"
         for name, load in static_loads(vehicle).items()

@@ -38,7 +38,8 @@ class Options(Samples):
 
 @dataclass(frozen=True)
 class EffectAlone:
-    """One effect left out alone: predicted and confirmed changes (quantities,); why it may not, else empty."""
+    """One effect that is left out alone: predicted and confirmed changes (quantities,), and the reason why it may not
+    be left out (else empty)."""
 
     effect: Effect
     predicted: np.ndarray
@@ -62,7 +63,8 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose, by runs for bent springs; saves ``choice.nc``, two CSV of it, a figure, files of what is left."""
+    """Choose effects, for nonlinear springs by runs; saves ``choice.nc``, two CSV files, a figure, and files of the
+    reduced scene."""
     check(scene, engines)
     if goes_in_time(scene):
         return save_choices([scene], engines, folder, progress)
@@ -91,7 +93,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
-    """Standard deviations of the full and the reduced scene, with their errors and assumptions."""
+    """Standard deviations in the complete scene and in the reduced one, as results with their errors and
+    assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
     vehicle = replace(reduced.vehicle, limits=reduced.limits)
     if reduced != ReducedScene.complete(scene):
@@ -105,7 +108,7 @@ def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
 
 
 def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
-    """Saved answer of a ride's choice: its effects, their changes and the saving."""
+    """Plain values of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted,
         "confirmed": choice.confirmed,
@@ -138,8 +141,8 @@ def _save(
     runs: tuple[dict[str, Result], dict[str, int]],
     folder: Path,
 ) -> None:
-    """Save the changes by leaving out each effect alone, predicted and confirmed, and whether it was left out; a CSV of
-    these and one of the energy activity of every element beside."""
+    """Save, for each effect, the predicted and confirmed changes if it alone is left out, and whether it was left out.
+    A result and a CSV file hold these; another CSV file holds the energy activity of every element."""
     import pandas as pd
 
     results, counts = runs
@@ -179,7 +182,8 @@ def choice_figure(
     results: dict[str, Result],
     path: Path,
 ) -> None:
-    """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
+    """Plot the changes by leaving out each effect alone and all together, with the tolerance, and the energy activity
+    of each element."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, save, subplots
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in single_effects]
@@ -208,7 +212,8 @@ def choice_figure(
 
 
 def _activity(axis: Any, watts: dict[str, float]) -> None:
-    """Plot the shares of the elements' finite watts; an inertia under white noise has none."""
+    """Bar chart of each element's share of the mean power, from the activities ``watts`` (W). Inertias under white
+    noise are left out, as their activity is not finite."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
@@ -229,7 +234,7 @@ def percent(value: float) -> str:
 def _table(
     scene: RideScene, choice: RideChoice, single_effects: list[EffectAlone], further: dict[Effect, float]
 ) -> list[str]:
-    """The choice in words."""
+    """Text of the choice."""
     tolerance = f"{100 * (scene.tolerance or 0):g} %"
     lines = [f"  left out: {', '.join(effect.name for effect in choice.left_out) or 'nothing'}"]
     lines += [f"    {effect.name}: {effect.says}" for effect in choice.left_out]
@@ -257,7 +262,7 @@ def _table(
 
 
 def saving(choice: RideChoice, tolerance: str) -> list[str]:
-    """Steps and calls at equal accuracy, in words."""
+    """Text on steps and calls at equal accuracy before and after the choice."""
     before, after = choice.before, choice.after
     lines = [
         f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "

@@ -112,7 +112,8 @@ def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
 
 
 def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
-    """Models by their number of freedoms, and by their file where two have the same."""
+    """Vehicles under names such as "7 freedoms"; the file's name is added where two vehicles have the same number of
+    freedoms."""
     counts = [len(vehicle.coordinates()) for vehicle in vehicles]
     return {
         f"{n} freedoms" + (f" of {vehicle.name}" if counts.count(n) > 1 else ""): vehicle
@@ -121,12 +122,14 @@ def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
 
 
 def _roads(vehicle: SpatialVehicle) -> list[str]:
-    """Roads that differ for a vehicle: one without a width knows one track, one without a length no delay."""
+    """Kinds of road whose effect on a vehicle can differ: all, or "one track" for a vehicle whose wheels all lie in its
+    middle."""
     return list(ROADS) if any(wheel.y for wheel in wheels(vehicle)) else ["one track"]
 
 
 def _costs(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
-    """Seconds of one covariance at one speed, of interleaved runs."""
+    """Computing times (s), REPEATS for each vehicle, to solve for the covariance at one speed. The vehicles take
+    turns."""
     assert scene.speeds is not None
     speed = float(scene.speeds.all()[0])
     systems = {
@@ -157,7 +160,7 @@ def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[s
 
 
 def _table(errors: Errors, costs: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
-    """The largest error of each model and road, by kind of output."""
+    """Table of the largest error of each vehicle model on each road, with a column per kind of output."""
     kinds = np.array([output.kind for output in full_vehicle.outputs])
     shown = list(dict.fromkeys(kinds.tolist()))
     width = max(len(f"{model}, {road}") for model, road in errors) + 2

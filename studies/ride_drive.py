@@ -79,7 +79,8 @@ def _answer(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]
 
 
 def _table(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
-    """Largest deviation of each output, and where taking each speed by itself is most wrong."""
+    """Table with each output's largest standard deviation along the drive, and where the quasi-stationary solution,
+    which takes each speed by itself, is most wrong."""
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]
     width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]

@@ -45,7 +45,7 @@ STYLES = ("-", "--", ":", "--", ":")
 
 
 class Heading(NamedTuple):
-    """Title of a figure, and the results whose warnings stand below it."""
+    """Title of a figure, and the results whose warnings are printed below it."""
 
     title: str
     results: Results
@@ -54,7 +54,8 @@ class Heading(NamedTuple):
 def along_figure(
     places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, heading: Heading, path: Path
 ) -> None:
-    """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
+    """Plot the standard deviation of the body's vertical acceleration in each case of road correlation: left along the
+    body at one speed, right over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
     for i, case in enumerate(at.cases):
@@ -87,7 +88,8 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 def outputs_figure(
     swept: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], heading: Heading, path: Path
 ) -> None:
-    """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
+    """Plot the standard deviations of the outputs over speed in the scene's own case, with a panel for each kind and
+    unit in ``kinds``."""
     groups = list(dict.fromkeys(kinds))
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
@@ -108,7 +110,7 @@ def outputs_figure(
 
 
 def _say_where_none(axis: Axes) -> None:
-    """Words in a panel whose curves have no finite value, as of forces under white noise."""
+    """Write into a panel that no curve in it is finite, as for forces under white noise."""
     if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
         axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
         axis.set_yticks([])
@@ -119,17 +121,17 @@ def _unit_text(unit: str) -> str:
 
 
 def _squared(unit: str) -> str:
-    """A unit's square: of one of several signs in brackets."""
+    """The square of a unit as text, with brackets around a unit of several symbols."""
     return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
 
 
 def _shown_unit(unit: str) -> tuple[str, float]:
-    """A unit as it is drawn, and the factor of what is drawn in it."""
+    """Unit in which an SI quantity is plotted (mm for m), and the factor that converts values to it."""
     return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
 
 
 def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Curves by name; those that lie on one another (left and right, mostly) as one with both names."""
+    """Curves by name; curves that coincide, mostly those of left and right, become one curve with both names."""
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
         for names, known in groups:
@@ -164,7 +166,8 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
-    """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
+    """Plot the spectrum of the left track and the coherency of both tracks, measured, fitted, and for an isotropic
+    road."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     if fitted is not None:
@@ -190,7 +193,7 @@ def detail_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
+    """Table of colours with the errors of all outputs by model and road, and the cost of a covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
     heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
@@ -217,7 +220,7 @@ def detail_figure(
 
 
 def _signed(percent: float) -> str:
-    """A whole number with its sign; zero has none."""
+    """Text of a whole number with its sign; no sign for zero."""
     return f"{percent:+.0f}" if round(percent) else "0"
 
 
@@ -229,7 +232,8 @@ def drive_figure(
     heading: Heading,
     path: Path,
 ) -> None:
-    """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
+    """Plot the standard deviations along a drive (dashed: each speed taken by itself), with a panel of the speed below
+    them."""
     groups = list(dict.fromkeys(kinds[name] for name in drawn_outputs))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = subplots(
@@ -257,7 +261,8 @@ MOST_OUTPUTS = 12
 
 
 def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
-    """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
+    """Plot each output's standard deviation over speed by small motion, statistical linearisation and Monte Carlo. Open
+    marks: statistical linearisation is no longer good by its own measure."""
     outputs = answer.shown.vehicle.outputs
     figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
     left = answer.of("left_out")
@@ -291,7 +296,7 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
 def engine_spectra_figure(
     runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, heading: Heading, path: Path
 ) -> None:
-    """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
+    """Plot spectra of the engines' runs, by Welch's method, over those of the statistically linearised vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
     expected = one_sided(linear, road, speed, frequency)
     first = next(iter(runs.values()))
@@ -311,14 +316,15 @@ def engine_spectra_figure(
 
 
 def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
-    """Two or three small panels beside each other."""
+    """Figure with two or three small panels side by side."""
     figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 
 
 def _name_below(axis: Axes, drop: float = 0.18) -> None:
-    """The legend below a panel, by a share of its height that leaves room for what is written there."""
+    """Put the legend below a panel, lower by the share ``drop`` of the panel's height to leave room for the axis
+    label."""
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 

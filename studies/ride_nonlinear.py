@@ -90,7 +90,8 @@ def _options(scene: RideScene) -> Options:
 
 
 def _answer(answer: Nonlinear) -> dict[str, Any]:
-    """Deviations and means at all speeds, SI; None where there is none. Of tyres that lift, at the copies' speeds."""
+    """Standard deviation and mean (SI) of each output at all speeds; None in place of a value that is not finite. For
+    tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
     copies = list(answer.copies.values())
     out: dict[str, Any] = {"speed": list(answer.copies) if answer.lifts else answer.speeds.tolist()}
     for key, on_road in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
@@ -103,7 +104,8 @@ def _answer(answer: Nonlinear) -> dict[str, Any]:
 
 
 def _table(answer: Nonlinear, speed: float) -> list[str]:
-    """Gains and sentences at one speed; the error of either linear vehicle where Monte Carlo is beside."""
+    """Text on the equivalent gains of the springs at one speed, and on the Monte Carlo copies with the errors of both
+    linear vehicles relative to them."""
     lines, shown = [f"  at {speed:g} m/s"], answer.shown
     for name, spring in shown.springs.items():
         k, c = spring.gains
@@ -128,7 +130,7 @@ def _table(answer: Nonlinear, speed: float) -> list[str]:
 
 
 def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
-    """Errors of small motion and of statistical linearisation where the speed is among those of the sweep."""
+    """Text on the errors of small motion and of statistical linearisation, if the speed is one of the sweep's."""
     at = np.flatnonzero(np.isclose(answer.speeds, speed))
     if not len(at):
         return ""
@@ -138,9 +140,8 @@ def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
 
 
 def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str, Ride]) -> list[str]:
-    """Share of time for which each tyre would pull by its Gaussian law, and for which it is in the air in the engines'
-    runs; nothing where no tyre lifts.
-    """
+    """Lines on two shares of time for each tyre. One is for how long a tyre bound to the road would pull, by a Gaussian
+    law; the other for how long it is in the air in the engines' runs. Empty if no tyre lifts."""
     from scipy.special import ndtr
 
     if not vehicle.lifts:
@@ -164,7 +165,8 @@ def _lift_off_shares(vehicle: SpatialVehicle, answer: Nonlinear, runs: dict[str,
 
 
 def _time_table(runs: dict[str, Ride], answer: Nonlinear, road: Excitation, speed: float) -> list[str]:
-    """Deviations of the engines' runs beside those of statistical linearisation, and how far the engines are apart."""
+    """Table of the engines' standard deviations next to those of statistical linearisation, and of the difference
+    between the engines."""
     if not runs:
         return []
     shown, (first, *others) = answer.shown, runs.items()

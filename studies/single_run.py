@@ -101,7 +101,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
 
 
 def _differences(axis: Any, results: dict[str, Result]) -> None:
-    """Difference to the first implementation, on a logarithmic scale, against time."""
+    """Plot the difference of each run from the first one over time, on a logarithmic scale."""
     from models.drawing.figures import COLOURS, LABELS
 
     (base, first), *others = results.items()

@@ -43,7 +43,8 @@ AXLES = ("front", "rear")
 
 
 def measured(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
-    """Values (n,) at the times of the drive of those channels that the file of the drive has too, in their units."""
+    """Measured values (n,) of the channels that the file of the drive contains, at the times of the computed drive and
+    in its units."""
     source = open_source(scene.path(scene.drive.file, "drive.file"))
     known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
     curves = {name: curve(source, name, driven.data[name].attrs["units"]) for name in known}
@@ -51,7 +52,8 @@ def measured(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
 
 
 def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
-    """Steer, the three channels over time, and of each axle its slip angle and the side force / load over it.
+    """Plot the steer angle and three channels over time. For each axle, plot its slip angle over time, and the ratio of
+    side force to load over slip angle.
 
     beside : values (n,) that were measured, drawn beside the channels of their names.
     """

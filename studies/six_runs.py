@@ -99,7 +99,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
 
 
 def _figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
-    """Figures like the paper's 4 to 8."""
+    """Draw figures like 4 to 8 of the paper."""
     from models.drawing.figures import save
 
     save(_figure_measurement(measured_run), folder / "fig4_measurement.png")
@@ -145,7 +145,8 @@ def _figure_measurement(measured_run: Result) -> Any:
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
-    """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
+    """Plot each run's heave error on a logarithmic scale, and its pitch; the first of the results is the
+    measurement."""
     from models.drawing.figures import COLUMN_WIDTH, TRUTH, heading, legend_below, subplots
 
     figure, (heave, pitch) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

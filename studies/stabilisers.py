@@ -57,7 +57,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _steps(results: Results) -> str:
-    """Text on the step error of the score: that of the measurement, whose steps all runs share."""
+    """Step error of the score as JSON text: that of the measurement, because all runs use its steps."""
     error = json.loads(next(iter(results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
@@ -65,7 +65,7 @@ def _steps(results: Results) -> str:
 
 
 def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
-    """The table as lines of text, a block per engine and road."""
+    """The table as lines of text, with a block for each engine and road."""
     lines = [
         f"  Damage ratios: {CONVENTION}, exponent {options.slope:g}. Accepted: all four body-frame ratios within "
         f"{options.limits.damage_error:.0%},",
@@ -109,7 +109,7 @@ def _line(row: Row, free: float) -> str:
 
 
 def _ratio(value: float | None) -> str:
-    """A damage ratio in six characters; none for a tumbled run."""
+    """Text of a damage ratio in at most six characters; "-" for a tumbled run, which has none."""
     return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}" if value < 1e3 else f"{value:.0e}"
 
 

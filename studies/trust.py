@@ -113,7 +113,8 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
 
 
 def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
-    """The force-excited scene, the run on the road that left its forces, if any, and the largest force (N)."""
+    """The scene driven by forces; the run on the road from which they come, if there is one; and the largest force
+    (N)."""
     if "road" not in scene.effects:
         return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
@@ -123,14 +124,16 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result
 
 
 def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
-    """Pitch error of a run beside another one's pitch, so that each source of error is seen alone."""
+    """Magnitude of the difference between a run's pitch and the pitch (rad) of another run that lacks one source of
+    error."""
     return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
 
 
 def _ensemble(
     base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
 ) -> dict[str, np.ndarray]:
-    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise, ``quiet``.
+    """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
+    run without noise, ``quiet``.
 
     The errors are nan from where a path left all bounds.
     """
@@ -144,7 +147,8 @@ def _ensemble(
 
 
 def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
-    """The result with the error of the steps, of the run without noise, and the standard error of the median."""
+    """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
+    median."""
     result.data.attrs["error"] = quiet.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
     middle, low, high = quantile(spread["drift_off"], 0.5)
@@ -155,7 +159,7 @@ def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], o
 
 
 def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
-    """Drift-off by source, and the noise paths."""
+    """Channels of the drift-off times by source, and of the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")
@@ -179,7 +183,7 @@ NAMES = {
 def _rows(
     curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
-    """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
+    """Predicted and measured drift-off times (s) by source; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
         measured, quartiles = runs[name].passes(options.angle) if name in runs else None, None
@@ -195,7 +199,8 @@ def _rows(
 def _text(
     rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Lines for the terminal: the table of trust, and what it would take to trust a longer run."""
+    """Lines for the terminal: predicted and measured drift-off times, and what a longer trustworthy run would
+    require."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
         *(f"  {NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured(row):>10}" for row in rows),
@@ -226,7 +231,8 @@ def _measured(row: Row) -> str:
 def _remedies(
     options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
-    """Sampling rate and noise for the wanted time, by the growth rate from the time that is predicted."""
+    """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
+    extrapolated by the growth rate of errors."""
     forces = assemble(base).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
@@ -266,7 +272,8 @@ def _figure(
     results: Results,
     path: Path,
 ) -> None:
-    """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
+    """Plot the growth of the pitch error by source on a logarithmic scale: predicted laws dashed, computed runs
+    solid."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, heading, save, subplots
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}

@@ -38,7 +38,7 @@ def page(twins: Twins) -> str:
 
 
 def _rows(listed: list[Element]) -> list[dict[str, Any]]:
-    """Elements that are not zero, with their values as text."""
+    """Nonzero elements, with their values as text."""
     return [
         {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": shown(each.value)}
         for each in listed

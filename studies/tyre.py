@@ -63,7 +63,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
 
 def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
-    """The figures of all tyres side by side."""
+    """Table of the friction figures under a load (N), with a column per tyre."""
     width = max(12, *(len(name) + 2 for name in answer))
     rows = [f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}" + "".join(f"{name:>{width}}" for name in answer)]
     keys = next(iter(answer.values()))

@@ -21,7 +21,8 @@ def tyre_figure(
     path: Path,
     results: Results,
 ) -> None:
-    """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
+    """Plot each table in a row: mu_x over slip, mu_y over slip, and mu_y over mu_x. slip_angles: slip angles (deg) of
+    the curves, and the load (N)."""
     angles, load = slip_angles
     figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):

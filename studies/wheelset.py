@@ -73,7 +73,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _results(paths: Paths) -> dict[str, Result]:
-    """Paths by engine and speed, in words."""
+    """Results of all paths, named by engine and speed."""
     return {
         f"{engine}, {at}": path
         for engine, paths_of_engine in paths.items()
@@ -82,7 +82,7 @@ def _results(paths: Paths) -> dict[str, Result]:
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
-    """Damping and frequency over the speeds."""
+    """Save a CSV table of damping and frequency over speed."""
     columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
     for engine, linear_run in linear.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
@@ -92,7 +92,7 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
 
 
 def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
-    """Critical speed and figures of the paths as plain numbers in SI; None where there is no critical speed."""
+    """Critical speed (None if there is none) and figures of the paths, as plain numbers in SI."""
     return {
         "klingel": klingel(wheelset),
         "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
@@ -105,7 +105,8 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict
 
 
 def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """Klingel's wavelength by its closed form, and how far each implementation's lies from it."""
+    """Lines on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each engine's
+    eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
     closed, first = klingel(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
     lines = [
@@ -123,7 +124,7 @@ def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
 
 
 def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
-    """The critical speed of every implementation, with the frequency there; or that there is none."""
+    """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
     lines = [
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
@@ -142,7 +143,7 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
 
 
 def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
-    """Lines on how each path ends, how far the implementations differ, and where the energy goes."""
+    """Lines on how each path ends, how far the engines' paths differ, and the energy balance."""
     if not paths:
         return []
     (name, first), *others = paths.items()
@@ -166,7 +167,7 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
 
 
 def _ending(motion: Motion) -> str:
-    """Last amplitude of a path, and what a cycle makes of it."""
+    """Text on a path's last amplitude, and by how much it changed in the last cycle."""
     y = motion.states[:, Y]
     tops = y[maxima(y)]
     if tops.size < 2:

@@ -35,19 +35,21 @@ SHOWN_SECONDS = 1.0
 
 
 def _note(axis: Axes, text: str, point: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
-    """Text that ends so many points beside a place."""
+    """Write text beside a point of the plot; the text's right end is shifted from the point by ``shift`` (printer's
+    points)."""
     axis.annotate(text, point, shift, textcoords="offset points", ha="right", **style)
 
 
 def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
-    """Name and colour of each wheel, and the sums (n,) over its patches of what they report under some names."""
+    """For each wheel: its name, its colour, and a sum (n,) over its contact patches for each of the named
+    quantities."""
     each = contacts.shape[1] // 2
     yield "right wheel", BLUE, [contacts[name][:, :each].sum(axis=1) for name in names]
     yield "left wheel", VERMILION, [contacts[name][:, each:].sum(axis=1) for name in names]
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
-    """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
+    """Plot growth rate and wavelength of the hunting motion over speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
@@ -91,7 +93,8 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
 
 
 def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
-    """Lateral displacement over time, a panel per speed; below, how far the engines are from the first one."""
+    """Plot lateral displacement over time, with a panel per speed, and below it the difference of each engine from the
+    first one."""
     paths: dict[str, dict[float, Motion]] = {
         engine: {speed: result.detail for speed, result in path_then.items()} for engine, path_then in results.items()
     }
@@ -118,7 +121,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 
 
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
-    """Creep forces on each wheel and their power in the last second of every path."""
+    """Plot creep forces on each wheel, and their power, over the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
@@ -138,7 +141,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 
 
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
-    """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
+    """Plot amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones open."""
     orbits: Sequence[Orbit] = branch.detail
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
@@ -169,7 +172,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 
 
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
-    """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
+    """Plot the limit cycle as yaw over lateral displacement in every engine, and its creep forces over one period."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
@@ -193,7 +196,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
 
 
 def conicity_figure(run: Result, title: str, path: Path) -> None:
-    """The difference of the rolling radii with the swing of every wave, and both conicities over the amplitude."""
+    """Plot the rolling radius difference with the amplitudes of the waves, and both conicities over the amplitude."""
     conicities: Conicities = run.detail
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows

@@ -55,7 +55,7 @@ def load(scene: AnyScene, set: Changes = None) -> "Scene":
 
 
 def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool = True, **how: Any) -> "Result":
-    """Run a scene in one engine, the usual one of its system if none is named, and save nothing.
+    """Run a scene in one engine and save nothing. Without a named engine, the system's usual one runs the scene.
 
     set : as in ``load``; error : whether the error of steps or cells is estimated, by further runs, which cost about
     half as much as the run; how : what the system's run takes besides, such as ``procedure`` of braking, ``manoeuvre``
@@ -106,7 +106,8 @@ def _check_how(scene: Any, how: Mapping[str, Any], options: Mapping[str, Any]) -
 
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
-    """The engine of a run, "" where the system chooses it, and those for which the scene is checked."""
+    """The engine of a run ("" where the system chooses its engine itself), and the engines for which the scene is
+    checked."""
     from studies.command.asked import engines_of
 
     named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
@@ -124,7 +125,8 @@ def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tu
 
 @contextmanager
 def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
-    """Messages that name an option of the command line name the argument instead, of the same name if not in ``names``.
+    """Context in which error messages name the argument of the library's function in place of the command line's
+    option. ``names`` maps options to arguments; an option that is not in it keeps its name.
 
     What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
     """
@@ -253,7 +255,8 @@ def choose(
 
 
 def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
-    """The scene with the study that makes a choice."""
+    """The scene with its study changed to the one that makes a choice of effects, and with these quantities and
+    tolerance."""
     asked = {"quantities": quantities, "tolerance": tolerance}
     changes: dict[str, Any] = {key: value for key, value in asked.items() if value is not None}
     study = scene.checked.CHOOSING

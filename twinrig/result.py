@@ -41,7 +41,7 @@ class Result(saved.Result):
 
     @property
     def errors(self) -> dict[str, Estimate]:
-        """Estimated errors by channel, with their units; empty where none was made."""
+        """Estimated error of each channel, with its unit; empty where the run estimated no errors."""
         return errors_of(self)
 
     @property
@@ -51,7 +51,7 @@ class Result(saved.Result):
 
     @property
     def assumed(self) -> list[str]:
-        """Assumptions that the run was judged by."""
+        """All assumptions that were checked in this run, broken or not."""
         return assumed_of(self)
 
     @property
@@ -129,7 +129,7 @@ class Result(saved.Result):
         return axes
 
     def _head(self, axes: "Axes") -> None:
-        """Title of the scene, the engine, and what the run must be doubted for."""
+        """Title the plot with the scene's title, the engine and the warnings about the result."""
         from textwrap import fill
 
         texts = (f"{self.data.attrs.get('title', '')}, {self._label}", *remarks({self._label: self}))

@@ -82,7 +82,7 @@ def plain(value: Any) -> Any:
 
 
 def _dotted_values(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys with their values."""
+    """Values of a nested table by their dotted keys."""
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
             yield from _dotted_values(value, f"{prefix}{key}.")

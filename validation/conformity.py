@@ -77,7 +77,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
 
 
 def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
-    """The rows, each printed as soon as it is there: a slow engine takes minutes."""
+    """Print each row as soon as it is computed, because a slow engine takes minutes; yields the rows."""
     for row in rows:
         print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}", flush=True)
         yield row
@@ -100,7 +100,7 @@ def _rows(name: str, folder: Path) -> Iterator[Row]:
 def _error_row(
     id: str, quantity: str, unit: str, bound: float, why: str, error: Callable[[], float], second: Independence
 ) -> Row:
-    """Row of an error; a check that cannot be carried out is failed, with what was raised."""
+    """Row of an error. If the check cannot be carried out, the row is failed and holds the message of the exception."""
     try:
         return Observed(id, SYSTEM, quantity, error(), unit).at_most(bound, why, second)
     except (InputError, RunFailed) as reason:
@@ -112,7 +112,8 @@ def _settings(name: str, step: float = STEP) -> Settings:
 
 
 def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
-    """The run itself, so that what it raises is told, which the checks count as infinitely far.
+    """Trajectory of an integrator. Exceptions pass through, so that their message is reported (the checks alone would
+    count an infinite error).
 
     Raises RunFailed too if its times are not the ends of the steps, at which it is compared.
     """
@@ -174,7 +175,8 @@ def _adaptive(name: str) -> bool:
 
 
 def _bound(name: str) -> float:
-    """A method of low order is as far off as its order says, which the order's own row judges."""
+    """Tolerance of the difference from the reference: loose for methods of low order, whose order has a row of its
+    own."""
     order = CATALOGUE[name][name].order
     return 1e-5 if _adaptive(name) else LOOSE if order >= 4 else 0.5
 
@@ -216,7 +218,8 @@ def _momentum(name: str, assembly: Assembly, settings: Settings) -> float:
 
 
 def _order(name: str, second: Independence) -> Row:
-    """Observed order of a method of fixed steps, or that a tighter tolerance gives a smaller error."""
+    """Row: observed order of a fixed-step method; for an adaptive one, that a tighter tolerance gives a smaller
+    error."""
     road = assemble(road_scene(duration=DURATION))
     if _adaptive(name):
         return _error_row(
@@ -247,7 +250,8 @@ def _tightened(name: str, road: Assembly) -> float:
 
 
 def _guards(name: str, folder: Path) -> Row:
-    """Forces of a million times the weight throw the vehicle out of all bounds, which must not pass as an answer."""
+    """Row: wheel forces of a million times the weight throw the vehicle out of all bounds, which must raise an
+    error."""
     throw = folder / "throw"
     throw.mkdir(exist_ok=True)
     run = simulate(road_scene(duration=DURATION), "reference")

@@ -60,7 +60,8 @@ Outcomes = dict[str, tuple[list[Row], float]]
 
 @dataclass(frozen=True)
 class Cases:
-    """Job (see ``models.ensemble.runner``): path i is the case ``names[i]``, whose data go into ``folder``."""
+    """Job (see ``models.ensemble.runner``) that measures cases: path i is the case ``names[i]``, whose data are written
+    to ``folder``."""
 
     names: tuple[str, ...]
     quick: bool
@@ -71,7 +72,7 @@ class Cases:
         return _array([self.record(self.names[i]) for i in paths])
 
     def record(self, name: str) -> Saved:
-        """Measure one case; raises what the case raises."""
+        """Measure one case; exceptions of the case pass through."""
         start = time.perf_counter()
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(
@@ -82,7 +83,8 @@ class Cases:
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
     def facts(self) -> Saved:
-        """The share, the code, and which measured files there are, without which rows are not run."""
+        """Facts on which rows depend: the cases, quick or full share, code version, and the available measured
+        files."""
         root, here = data_folder(), Path(__file__).parent
         sizes = (
             {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
@@ -103,7 +105,8 @@ def _array(records: list[Saved]) -> Arrays:
 
 
 def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
-    """Rows and seconds of all cases; those that an earlier go has finished are taken from there.
+    """Rows and computing times (s) of all cases; cases that an earlier, interrupted run finished are read, not measured
+    again.
 
     alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
     again and again, is a failed row and is measured again by the next go. Raises InputError for a folder of another
@@ -126,7 +129,7 @@ def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None],
 
 
 def _broken(name: str, reason: str) -> Row:
-    """The failed row of a case that gave none."""
+    """Failed row of a case that gave no rows."""
     return failed(f"{name}.broken", f"case {name}", reason)
 
 
@@ -162,7 +165,7 @@ def validate(
 
 
 def _data() -> str:
-    """The measured files that rows may be of."""
+    """Text on the number and size of the measured files that are available."""
     folder = data_folder()
     if folder is None:
         return "no measured files: TWINRIG_DATA names no folder; the rows that need some are not run"
@@ -188,13 +191,14 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
 
 
 def _last_duration(name: str) -> float:
-    """Seconds of a case in the last full report; what lasts, or is not known, is begun first."""
+    """Computing time (s) of a case in the last full report, infinite if unknown; cases that take longest are started
+    first."""
     return float(full()[name]["seconds"]) if name in full() else math.inf
 
 
 def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Value of a function that a prepared process of the pool runs; this process runs it once a process of the pool
-    died."""
+    """Value of a function that a process of the pool computes; if a process of the pool has died, this process computes
+    it."""
     if pool is None:
         return function(*arguments)
     try:
@@ -204,7 +208,7 @@ def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *argum
 
 
 def _write_report(pool: Executor | None, folder: Path) -> Path:
-    """The report, its figures drawn by the pool; by this process, once one of the pool's died."""
+    """Write the report. Its figures are drawn by the pool, or by this process if one of the pool has died."""
     from validation.report.page import write
 
     if pool is None:
@@ -216,14 +220,14 @@ def _write_report(pool: Executor | None, folder: Path) -> Path:
 
 
 def seeds() -> dict[str, int]:
-    """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
+    """All seeds on which rows depend; with equal seeds and versions all counts and states repeat exactly."""
     modules = {name: import_module(name) for name in (*(f"validation.cases.{case}" for case in CASES), *SEEDED)}
     drawn = {name.rpartition(".")[2].replace("_", " "): module for name, module in modules.items()}
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
 def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | None = None) -> None:
-    """results.json and results.csv; what changed since an earlier report is printed first."""
+    """Write results.json and results.csv, and print what changed since an earlier report."""
     table = [row.as_dict() for row in rows]
     content: Saved = {"provenance": source, "rows": table}
     if earlier_report is not None:
@@ -237,7 +241,8 @@ def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | N
 
 
 def say(rows: list[Row], seconds: float | None, page: Path) -> int:
-    """Print how many rows have which status, and every row that failed, was missed or was not run; how many failed."""
+    """Print the number of rows by status, and each row that failed, missed its aim or was not run; returns the number
+    of failed rows."""
     of = {status: [row for row in rows if row.status == status] for status in STATUSES}
     counts = ", ".join(f"{len(of[status])} {status}" for status in reversed(STATUSES))
     print(f"{len(rows)} rows: {counts}{'' if seconds is None else f'; {seconds:.0f} s'}")

@@ -31,7 +31,8 @@ HEADS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "st
 
 @dataclass(frozen=True)
 class Match:
-    """A channel of both: values (n,) at times (n,) of the run (s), in the run's unit.
+    """One channel that was both computed and measured: values of both (n,) at the same times (n,) of the run (s), in
+    the run's unit.
 
     stated : error that the run states for it, NaN where it states none.
     """
@@ -45,7 +46,7 @@ class Match:
 
     @property
     def error(self) -> np.ndarray:
-        """(n,): run less measurement."""
+        """Error (n,): value of the run minus measured value."""
         return self.run - self.measured
 
     @property
@@ -71,7 +72,7 @@ class Match:
 
     @property
     def at(self) -> float:
-        """Time (s) of the run at which that is."""
+        """Time (s) of the run at which the error is largest."""
         return float(self.times[self.row])
 
     def values(self) -> dict[str, float | None]:
@@ -82,14 +83,15 @@ class Match:
 
 @dataclass(frozen=True)
 class Overlay:
-    """A measurement over one run: its shift, the channels of both, and notes on what could not be compared."""
+    """Comparison of a measurement with one run: the time shift, the common channels, and notes on what could not be
+    compared."""
 
     shift: Shift
     matches: list[Match]
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """Lines for the screen."""
+        """Lines of the comparison for the screen."""
         head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
         rows = [
             f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {_share(each.relative):>9} {each.peak:>11.4g}  "
@@ -99,7 +101,7 @@ class Overlay:
         return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
 
     def told(self) -> str:
-        """A sentence on the shift."""
+        """Sentence for the screen about the time shift between measurement and run."""
         shift, alike = self.shift.seconds, self.shift.correlation
         if np.isnan(alike):
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
@@ -108,7 +110,8 @@ class Overlay:
 
 
 def _share(relative: float) -> str:
-    """Relative error of a channel; not a number for a channel that does not vary."""
+    """Relative error of a channel as a percentage in text; "-" where it is not finite, as for a constant
+    measurement."""
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
 
 
@@ -117,7 +120,7 @@ def _within_error_text(match: Match) -> str:
 
 
 def against(run: Path, measurement: Path) -> bool:
-    """Whether a comparison is of a run with a measurement: a saved result or a folder, and a file of measurements."""
+    """Whether the two paths are a run (a saved result or a folder) and a file of measurements, in this order."""
     return (
         (run.is_dir() or run.suffix == ".nc")
         and not measurement.is_dir()
@@ -127,7 +130,7 @@ def against(run: Path, measurement: Path) -> bool:
 
 
 def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
-    """Lay a measurement over a run, largest relative error first.
+    """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
     channel of each under a name. shift : s, what the measurement's clock shows at the run's time 0; sought where None.
@@ -155,7 +158,8 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
 
 
 def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
-    """Channels of the run that a measured channel is laid over: that of its name, or of its name in each engine."""
+    """Names of the run's channels to compare with a measured channel: the same name, or this name followed by each
+    engine's."""
     if name in ours:
         return [name]
     return [each for each in (f"{name}, {engine}" for engine in engines) if each in ours]
@@ -169,7 +173,7 @@ def _notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> 
 
 
 def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
-    """A channel of both, in the unit of the run."""
+    """Times and values of one channel in the run and in the measurement, both in the run's unit."""
     if not channel.unit and ours.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
         raise InputError(source.path, channel.name, None, allowed)
@@ -183,7 +187,8 @@ def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
 
 
 def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
-    """A channel of both at the times of the measurement that lie within the run; None where there are none."""
+    """Compare one channel at those measured times that lie within the run; None if no measured time does. The run is
+    interpolated by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     times = channel_pair.times - shift
@@ -203,7 +208,7 @@ def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: R
 
 
 def saved_results(place: Path) -> dict[str, Result]:
-    """The saved results of a file or a folder, by their names; InputError where there are none."""
+    """All saved results in a file or folder, by name; raises InputError if there are none."""
     if not place.exists():
         raise InputError(place, "", None, "no such file or folder")
     files = [place] if place.is_file() else sorted(place.rglob("*.nc"))
@@ -213,7 +218,8 @@ def saved_results(place: Path) -> dict[str, Result]:
 
 
 def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
-    """Lay a measurement over the run or the runs of a folder, save ``compare.csv`` and figures, say it in lines."""
+    """Compare a measurement with a run, or with the runs in a folder; saves ``compare.csv`` and figures, and returns
+    the lines to print."""
     overlays = {name: overlay(run, measurement, shift) for name, run in saved_results(run_path).items()}
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
@@ -244,7 +250,7 @@ def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
 
 
 def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
-    """Draw measurement and run, and below their difference, of the channels of the largest relative error."""
+    """Plot the channels with the largest relative errors: measurement and run, and their difference below."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     shown = overlay.matches[:SHOWN_CHANNELS]

@@ -31,12 +31,12 @@ def studies() -> tuple[str, ...]:
 
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
-    """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
+    """Load a scene by name from those that come with twinrig, or from a file whose name ends in .toml."""
     return load(scene_path(name), changes or (), KNOWN_SYSTEMS)
 
 
 def scene_path(name: str) -> Path:
-    """The file of a scene; InputError if there is none."""
+    """Path of a scene's file; raises InputError if there is no such scene."""
     names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
     if name in names:
         return SCENES / f"{name}.toml"
@@ -53,7 +53,7 @@ def scene_path(name: str) -> Path:
 
 
 def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
-    """The study's module, once everything that can be refused before a run has been checked."""
+    """The module of a scene's study, after everything was checked that can be checked before a run."""
     module = study_of(scene)
     plan_of(scene).check(scene, engines)
     if hasattr(module, "check"):
@@ -62,7 +62,7 @@ def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
 
 
 def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
-    """InputError for what no engine would run; what only some of them refuse, the scene's plan tells."""
+    """Raise InputError if no engine can run the scene. If only some engines refuse it, the scene's plan says so."""
     try:
         checked_study(scene, engines)
     except InputError:
@@ -79,19 +79,19 @@ def _runs(scene: Any, engine: str) -> bool:
 
 
 def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
-    """Whether a study needs no array library besides numpy: it has no workers, no units to convert, no user's code."""
+    """Whether a study can run with numpy alone: it uses no workers, no unit conversion, and no user's code."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
     shared = hasattr(module, "BLOCKS") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
 
 
 def plan_of(scene: Any) -> Any:
-    """The module that describes and checks scenes of this one's system."""
+    """The module that describes and checks scenes of this scene's system."""
     return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 
 def findings_of(scene: Any) -> tuple[Finding, ...]:
-    """Doubts about what a scene puts in, before anything is run; raises InputError for what cannot be."""
+    """Doubts about the input of a scene, before anything is run; raises InputError for impossible input."""
     look = getattr(plan_of(scene), "findings", None)
     unended = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
     return (*(look(scene) if look else ()), *unended)
@@ -108,7 +108,7 @@ def causes(scene: Any) -> list[str]:
 
 
 def _unended(scene: Any) -> Iterator[Finding]:
-    """Remarks on the CSV files that a scene names whose last line has no line end."""
+    """Notes on CSV files of a scene whose last line lacks its line end."""
     from models.core.tables import has_line_end
 
     for name in dict.fromkeys(_files(scene.table())):

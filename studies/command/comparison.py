@@ -26,7 +26,8 @@ EQUAL_PLACES = 1e-9
 
 
 def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
+    """Differences of all quantities that occur in both results, largest relative one first, and notes on quantities
+    that occur in only one.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
@@ -41,21 +42,21 @@ def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[s
 
 
 def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences between two results in memory, which messages and notes call by ``names``."""
+    """Differences between two results in memory; ``names`` are their names in messages and notes."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
 def _by_share(differences: list[QuantityDifference], first: object, second: object) -> list[QuantityDifference]:
-    """The largest share first; raises InputError where there is none."""
+    """Differences sorted by their share of the quantity, largest first; raises InputError if there are none."""
     if not differences:
         raise InputError(second, "", None, f"has no quantity in common with {first}: compare two results of one study")
     return sorted(differences, key=lambda each: -each.share)
 
 
 def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
-    """Notes on names that one side alone has."""
+    """Notes on names that occur in only one of the two results."""
     return [
         f"{prefix}only in {path}: {', '.join(alone)}"
         for (path, names), (_, others) in (sides, sides[::-1])
@@ -64,7 +65,8 @@ def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> li
 
 
 def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
-    """Files to compare, the two themselves or those of the same name in both folders, and notes on the others."""
+    """Pairs of files to compare: the two given files, or files of equal name in both folders; and notes on files
+    without a partner."""
     for path in (earlier, later):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
@@ -92,7 +94,8 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    """Results of a folder by their names within it; netCDF files alone where there are any that no table repeats."""
+    """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too. If there are
+    none, the CSV files."""
     files = [
         path
         for path in sorted(folder.rglob("*"))
@@ -104,12 +107,13 @@ def _files(folder: Path) -> dict[str, Path]:
 
 
 def _tabled(path: Path) -> bool:
-    """Whether the CSV beside a netCDF file is the same table: its channels have one axis."""
+    """Whether a netCDF file and the CSV file of the same name hold the same table: all channels have one common
+    axis."""
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
 def results_of(first: Path, second: Path) -> dict[str, Result]:
-    """The results that are compared, by their files: those of tables are the netCDF files beside them."""
+    """Results to compare, by file; for a CSV table beside a netCDF file, the netCDF file is read."""
     files = [file for _, *pair in _pairs(first, second)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
     return {
@@ -120,7 +124,7 @@ def results_of(first: Path, second: Path) -> dict[str, Result]:
 
 
 def _result(path: Path) -> Result | None:
-    """The saved result of a file, or of the netCDF file beside a table; None where there is none."""
+    """The saved result of a file, or of the netCDF file that belongs to a CSV table; None if there is none."""
     beside = path.with_suffix(".nc")
     return load(beside) if beside.is_file() else None
 
@@ -131,7 +135,7 @@ def _quantities(path: Path) -> Iterator[tuple[str, Quantity]]:
 
 
 def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
-    """Quantities with the errors that the result of which they are states."""
+    """Quantities of a result, each with the error that the result states for its channel, if it states one."""
     errors = {} if run is None else errors_of(run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
@@ -139,7 +143,8 @@ def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]])
 
 
 def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
-    """Channels of numbers of a dataset, a quantity for each of their rows along time or another axis."""
+    """Numeric channels of a dataset as quantities over time or another axis. A channel with further axes gives one
+    quantity for each entry of these."""
     kinds = ", ".join(str(data.attrs[kind]) for kind in KINDS if kind in data.attrs)
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
@@ -156,13 +161,14 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
 
 
 def _dimension_along(channel: Any) -> Any:
-    """The dimension that a channel is read along: time, or the longest whose entries are numbers or have no names."""
+    """Dimension along which a channel is compared: time, or else the longest one that has numbers, or no names, as
+    coordinates."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
 def _grid(channel: Any, along: Any) -> tuple[str, np.ndarray]:
-    """Name and values of the coordinate along a dimension; entries are counted where it has none."""
+    """Name and values of the coordinate along a dimension; row numbers if it has none."""
     if along not in channel.coords:
         return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
     unit = channel[along].attrs.get("units", "s" if along == "time" else "")
@@ -201,7 +207,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
 
 
 def _difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
-    """Raises InputError where kinds of runs, units or rows do not fit."""
+    """Difference of one quantity in two results; raises InputError if their kinds, units or rows do not match."""
     if first.kind != second.kind:
         raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
     if (first.unit, first.over) != (second.unit, second.over):
@@ -231,7 +237,8 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> Q
 
 
 def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
-    """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
+    """Difference of two runs with rows at different times; the denser run is interpolated at the other's rows by a
+    cubic spline."""
     from scipy.interpolate import CubicSpline
 
     fine, coarse = (first, second) if len(first.grid) > len(second.grid) else (second, first)
@@ -251,7 +258,7 @@ def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> Quan
 
 
 def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
-    """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
+    """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the lines to print."""
     differences, notes = compare(first, second)
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
@@ -278,7 +285,7 @@ def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
 
 
 def lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
-    """Lines for the screen: what differs most, and the notes."""
+    """Lines for the screen: the quantities with the largest differences, and the notes."""
     return [*_lines(differences), *(f"  {note}" for note in notes)]
 
 
@@ -301,7 +308,7 @@ def _lines(differences: list[QuantityDifference]) -> list[str]:
 
 
 def _difference_text(difference: QuantityDifference) -> str:
-    """Where a difference is largest, and whether it tells anything."""
+    """Text on where a difference is largest; it adds if the difference lies within the stated errors."""
     return (
         f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
         if difference.within

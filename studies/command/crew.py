@@ -18,7 +18,7 @@ def given_crew(workers: int | None, cluster: str | None) -> dict[str, Any]:
 
 
 def crew_of(scene: Any, workers: int | None, cluster: str | None) -> "Crew":
-    """The crew of a scene with these options."""
+    """The workers of a scene, with these options in place of the scene's own."""
     from models.ensemble.workers import Crew
 
     return Crew.of(scene.model_copy(update=given_crew(workers, cluster)))

@@ -7,7 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Quantity:
-    """values (n,) over ``grid`` (n,), which is a time, a coordinate or the first column of a table, or counts rows.
+    """Values (n,) of one quantity over ``grid`` (n,): times, another coordinate, the first column of a table, or row
+    numbers.
 
     kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
     no number; error : that the result states for its channel, in its unit, nan where it states none.
@@ -24,7 +25,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class QuantityDifference:
-    """``second`` less ``first`` over ``grid`` (n,); ``note`` : how the two were brought to the same rows.
+    """Difference ``second`` minus ``first`` over ``grid`` (n,); ``note`` : how both were brought to the same rows.
 
     stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
     """
@@ -41,12 +42,13 @@ class QuantityDifference:
 
     @property
     def within(self) -> bool:
-        """Whether both results differ by less than they say that they err: then the difference tells nothing."""
+        """Whether the rms difference of both results is within the errors that they state: then it has no
+        significance."""
         return 0.0 < self.rms <= self.stated
 
     @property
     def gap(self) -> np.ndarray:
-        """(n,) nan in both is no difference; infinite where only one of them is a number, or the infinities differ."""
+        """Difference (n,); 0 where both are NaN, infinite where only one is a number or the infinities differ."""
         with np.errstate(invalid="ignore"):
             gap = self.second - self.first
         same = (self.first == self.second) | (np.isnan(self.first) & np.isnan(self.second))
@@ -54,7 +56,7 @@ class QuantityDifference:
 
     @property
     def row(self) -> int:
-        """Where the difference is largest."""
+        """Index of the row at which the difference is largest."""
         return int(np.abs(self.gap).argmax())
 
     @property
@@ -69,16 +71,16 @@ class QuantityDifference:
 
     @property
     def at(self) -> float:
-        """Where on the grid the difference is largest."""
+        """Position on the grid at which the difference is largest."""
         return float(self.grid[self.row])
 
     @property
     def where(self) -> str:
-        """Place of the largest difference, in words."""
+        """Text on where the difference is largest."""
         return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property
     def share(self) -> float:
-        """Largest difference by the largest magnitude of the first."""
+        """Ratio of the largest difference to the largest magnitude of the first result."""
         size = np.abs(self.first[np.isfinite(self.first)]).max(initial=0.0)
         return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf

@@ -12,7 +12,8 @@ from models.engines.export import SUFFIXES, Exported
 
 
 def exported(scene: Any, engine: str) -> Exported:
-    """The file's text and what it leaves out; InputError for an engine or a scene that nothing can be left of."""
+    """Text of the exported file, and a list of what it leaves out. Raises InputError for an engine without a file
+    format and for a system without an exportable vehicle."""
     if engine not in SUFFIXES:
         raise InputError("--engine", "", engine, "no engine that has files of its own", tuple(SUFFIXES))
     if scene.system not in _systems():
@@ -28,7 +29,8 @@ def _systems() -> tuple[str, ...]:
 
 
 def target(scene: Any, engine: str, output_path: Path | None) -> Path:
-    """The file to write; InputError where it is there already, has another end, or lies in no folder."""
+    """Path of the file to write; raises InputError if it exists, has the wrong extension, or its folder does not
+    exist."""
     suffix = SUFFIXES.get(engine, "")
     path = output_path or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
     if path.suffix != suffix:

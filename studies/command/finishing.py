@@ -23,7 +23,8 @@ def exit_with_message(message: str, code: int) -> NoReturn:
 
 
 def profile_lines(profile: bool) -> Callable[[Work], Work]:
-    """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
+    """A wrapper for the work: with ``profile``, the work also reports where its computing time went; else it is
+    unchanged."""
     if not profile:
         return lambda work: work
     from studies.command.profile import Watch
@@ -65,7 +66,7 @@ def finish(
 
 
 def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | None, resume: Path | None) -> Path:
-    """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
+    """Folder for the results: a new one, or that of an interrupted run, whose finished parts are in ``blocks``."""
     from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:
@@ -78,12 +79,13 @@ def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | N
 
 
 def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
-    """Lines of those findings that a plan or a study has not told."""
+    """Lines of the findings whose text does not occur in ``told``, which is what a plan or a study has printed
+    already."""
     return lines(finding for finding in findings if finding.text not in told)
 
 
 def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
-    """Summary as a person reads it."""
+    """Print a summary for a human reader."""
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():
         steps, calls = line["counts"].get("steps", 0), line["counts"].get("force calls", 0)

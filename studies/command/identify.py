@@ -55,7 +55,8 @@ def identify(
 def profiles_of(
     scene: Any, uncertainty: Uncertainty, all_profiles: bool = False, tell: Tell = lambda text, share: None
 ) -> Iterator[LikelihoodProfile]:
-    """Profiles of every parameter, or of those that the data do not determine, computed by the scene's crew."""
+    """Likelihood profiles of all parameters, or only of those that the data do not determine, computed by the scene's
+    workers."""
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.determined[k]
     ]
@@ -66,7 +67,8 @@ def profiles_of(
 
 
 def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float) -> dict[str, Any]:
-    """Everything that stages depend on."""
+    """Inputs on which saved stages of an identification depend: if one of them changes, the stages are computed
+    anew."""
     table = scene.table()
     return {
         "scene": table,
@@ -81,7 +83,8 @@ def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, l
 def report(
     scene: Any, measurement: Path, parameters: Sequence[str], folder: Path, tell: Tell, all_profiles: bool, **more: Any
 ) -> dict[str, Any]:
-    """Identify, save ``identify.json`` and ``identify.png``, and say it in lines; every : profiles of all of them."""
+    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the lines to print. all_profiles :
+    profiles of all parameters."""
     known = identify(scene, measurement, parameters, folder=folder, tell=tell, **more)
     drawn = list(profiles_of(scene, known, all_profiles, tell))
     answer = as_dict(known, drawn)
@@ -98,7 +101,7 @@ def report(
 
 
 def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
-    """All of it in plain values; None stands for a standard error that is none."""
+    """Uncertainty and profiles as plain values; None where a standard error does not exist."""
     solved, names = uncertainty.fit, [each.name for each in uncertainty.fit.problem.parameters]
     return {
         "estimates": {
@@ -130,7 +133,7 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
 
 
 def correlation(uncertainty: Uncertainty) -> np.ndarray:
-    """(p, p): of the estimates, 0 with those at a bound."""
+    """Correlation matrix (p, p) of the estimates; 0 for estimates at a bound."""
     size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
     return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
@@ -141,7 +144,7 @@ def _finite_number(value: float) -> float | None:
 
 
 def errors(fit: Fit) -> dict[str, float]:
-    """Rms error of each channel by its rms."""
+    """For each channel, ratio of the rms error to the rms of the channel."""
     weights = fit.problem.weights > 0.0
     return {
         channel.name: float(np.sqrt(np.mean(row[used] ** 2)))
@@ -179,7 +182,8 @@ def lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) 
 
 
 def late_clock(uncertainty: Uncertainty) -> float:
-    """s by which the measurement seems later than the model; 0 unless both are ``NEARER`` as near when laid so.
+    """Delay (s) of the measurement relative to the model; 0 unless shifting by it makes the mismatch ``NEARER`` times
+    smaller.
 
     The model is that of the start: estimates take up a part of the delay.
     """
@@ -224,7 +228,7 @@ def _combined(uncertainty: Uncertainty) -> list[str]:
 
 
 def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
-    """Every channel with the model at the estimates, the error below it."""
+    """Plot every measured channel with the model at the estimates, and the error below it."""
     from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
 
     problem = uncertainty.fit.problem

@@ -42,7 +42,7 @@ FORCES = frozenset(("force", "forces", "law"))
 
 
 class Watch:
-    """Seconds of the main thread by what it did, from ``begin`` until ``told``."""
+    """Profile of the main thread: seconds spent in each kind of work, from creation of the watch until ``told``."""
 
     def __init__(self) -> None:
         self.seconds = defaultdict[str, float](float, {BEGIN: time.process_time()})
@@ -61,7 +61,7 @@ class Watch:
             last = now
 
     def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
-        """Do the work, end the watch, and add its lines to the summary of the work."""
+        """Do the work, stop the watch, and add its lines to the summary."""
         summary = work(progress)
         self._over.set()
         self._thread.join()
@@ -70,7 +70,7 @@ class Watch:
 
 
 def part_of_run(frame: FrameType) -> str:
-    """Which part of a run a stack of calls belongs to, by its innermost frame that tells."""
+    """Kind of work that a call stack is doing, from the innermost call that can be classified."""
     engine, forces = "", False
     for name, path in _calls(frame):
         if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
@@ -99,7 +99,8 @@ def _calls(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
 
 
 def _engine(path: PurePath) -> str:
-    """The engine that a file belongs to: of its own package, or ours around it; else empty."""
+    """Name of the engine to which a source file belongs, either in its own package or in ``models/engines``; else
+    empty."""
     if path.parent.name in ENGINES:
         return path.parent.name
     named = (engine for engine in ENGINES if engine in path.stem)
@@ -107,7 +108,7 @@ def _engine(path: PurePath) -> str:
 
 
 def lines(spent: dict[str, float]) -> list[str]:
-    """The table that is printed: seconds and shares, the largest first."""
+    """Table to print with the seconds and shares of each kind of work, largest first."""
     whole = sum(spent.values())
     rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]
     return [f"  where {whole:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]

@@ -85,8 +85,8 @@ class Points:
         raise first
 
     def record(self, i: int) -> Record:
-        """Numbers of one point by their names, what failed, by engine where the study told it, and what its results say
-        of themselves."""
+        """Record of one point: its numbers by name, the failures (by engine, where the study gives them), and the
+        errors and assumptions that its results state."""
         try:
             scene, engines, study = self.ready(i)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
@@ -98,7 +98,7 @@ class Points:
         return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
-        """Everything that the points depend on: the scene as written, the files that it names, the code."""
+        """Everything on which the points depend: the scene as written, the files that it names, and the code."""
         path = scene_path(self.scene)
         table = changed(path, self.changes)
         return {
@@ -122,7 +122,8 @@ def _failed(reason: object) -> Record:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into that takes its name when all of it is there, in place of what may lie there."""
+    """Context with a folder to write into. It gets its final name only when it is complete, and replaces an older
+    folder of this name."""
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
     part.mkdir(parents=True)
     try:
@@ -155,7 +156,7 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
 
 
 def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
-    """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
+    """The job of the sweep in ``text``, without its folder; raises InputError if none of its points can be run."""
     key, values = parse_range(text)
     job = Points(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
@@ -163,7 +164,7 @@ def points(text: str, scene: str, changes: Sequence[str], engine: str | None, er
 
 
 def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
-    """Evenly spaced values; whole numbers where both ends and the spacing are."""
+    """Evenly spaced values; integers if both ends and the spacing are integers."""
     try:
         ends, n = (float(first), float(last)), int(count)
     except ValueError:
@@ -176,7 +177,7 @@ def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
 
 
 def _listed(rest: str) -> tuple[Any, ...]:
-    """Values as a scene file would hold them, or texts without quotes."""
+    """Values of a list in a scene file's notation; words may lack quotes."""
     try:
         return tuple(tomllib.loads(f"x = [{rest}]")["x"])
     except ValueError:
@@ -189,7 +190,7 @@ def _value_text(value: Any) -> str:
 
 
 def _writable(value: Any) -> bool:
-    """Whether a scene file that holds what is written holds this value."""
+    """Whether a scene file can represent this value exactly."""
     try:
         return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
     except ValueError:
@@ -228,7 +229,8 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
 
 
 def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
-    """The records as columns, and what their results say."""
+    """The records of all points as one column per quantity, with the failures and with the errors and assumptions of
+    the results."""
     from studies.command.sweep_figure import Swept
 
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
@@ -239,7 +241,7 @@ def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
 
 
 def _unit(job: Points) -> str:
-    """Unit of a key of the scene, as its table states it, "-" of what has none; "SI" where no table says."""
+    """Unit of the key that is swept: "-" if its table gives it none, "SI" if no table describes the key."""
     owner: Any = load_scene(job.scene, list(job.changes))
     *tables, name = job.key.split(".")
     for table in tables:
@@ -292,18 +294,19 @@ def _save(folder: Path, swept: "Swept") -> None:
 
 
 def _largest_error(results: told.Results) -> float | None:
-    """The largest error of a point's results, by its channel's deviation; None where none was estimated."""
+    """Largest relative error among a point's results, each error divided by the standard deviation of its channel; None
+    where no error was estimated."""
     return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
 
 def _broken(results: told.Results) -> str:
-    """Assumptions that a point's results broke, with the share of the time."""
+    """Text on assumptions that a point's results broke, each with the share of the time for which it was broken."""
     breaches = [(name, breach) for name, run in results.items() for breach in broken_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
-    """The first quantities that change, from their least to their largest value."""
+    """Table of the quantities that change in the sweep, at most 12: first, last, least and largest value."""
     moving = {name: present_numbers(column) for name, column in columns.items() if has_several_values(column)}
     lines = [
         f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "

@@ -72,7 +72,7 @@ class Swept:
 
 
 def _results_of_engine(results: Results, engine: str) -> Results:
-    """Results that an engine's curve rests on: its own, and those of none."""
+    """Results on which an engine's curve is based: those of this engine, and those that belong to no engine."""
     others = set(LABELS) - {engine} if engine else set()
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
 
@@ -90,7 +90,8 @@ def draw_sweep(swept: Swept, folder: Path) -> list[str]:
 
 
 def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
-    """Quantities that change -> curve of each implementation, "" where there is but one."""
+    """Quantities that change in the sweep, each with a curve per engine; the engine's name is "" for numbers without
+    one."""
     panels: dict[str, dict[str, list[Any]]] = {}
     for name, column in columns.items():
         first, _, rest = name.partition(", ")
@@ -119,7 +120,7 @@ def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Pat
 
 
 def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
-    """Places on the axis and, for values that are no numbers, what is written there."""
+    """Positions on the axis; for values that are not numbers also the labels to write there."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.array(values, float), []
     return np.arange(float(len(values))), [str(value)[:18] for value in values]
@@ -150,7 +151,8 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
 
 
 def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:
-    """Open marks around points of a curve whose results broke an assumption, or have an error that is a warning."""
+    """Draw open marks around the points of a curve at which a result broke an assumption or has an error that is a
+    warning."""
     for points, look in ((swept.broken(engine), BROKEN), (swept.warned(engine), WARNING)):
         shown = [i for i in points if np.isfinite(values[i])]
         if shown:
@@ -158,7 +160,7 @@ def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: 
 
 
 def _with_unit(quantity: str) -> str:
-    """A quantity with its unit; counts have none, and what else tells none is in SI."""
+    """Label of a quantity with a unit. Where the name holds no unit, it is "-" for counts and "SI" for all others."""
     return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
 
 

@@ -27,8 +27,9 @@ def _silent(what: str, share: float) -> None:
 
 @dataclass(frozen=True)
 class Wanted:
-    """states : random ones, at which accelerations are compared; paths : whether they are compared, too; tolerance
-    (rad, m), quantity : of the price, None for none and for all joints; controls : file of those of paths."""
+    """Options of the command. states: number of random states at which accelerations are compared; paths: whether paths
+    are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints; controls:
+    file of the controls on the paths."""
 
     states: int = COUNT
     paths: bool = True
@@ -39,9 +40,9 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """One file: what was read, how its builds agree with it, elements that explain where one does not, by build; where
-    MuJoCo's parser made something else of a URDF; paths, None where they were not asked for; price :
-    lines on what accuracy costs; constraints : lines on dry friction and constraints."""
+    """Results for one model file: the file as read and how well each build agrees with it. explained: for a build that
+    disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of paths,
+    None if not wanted; price: lines on the cost of accuracy; constraints: lines on dry friction and constraints."""
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
@@ -53,19 +54,19 @@ class Examined:
 
     @property
     def name(self) -> str:
-        """Of the file."""
+        """Name of the model file."""
         return self.file.document.path.name
 
     @property
     def certified(self) -> bool:
-        """Whether all builds move as the file does, and the parser lost nothing."""
+        """Whether all builds agree with the file, and MuJoCo's parser lost nothing."""
         return all(each.alike for each in self.agreements) and not self.misread
 
 
 @dataclass(frozen=True, eq=False)
 class Twins:
-    """What the command found: one file or two, their comparison, and how far their paths are apart, None where these
-    were not asked for or the files have not the same coordinates."""
+    """Results of the command for one file or two. comparison: that of the two files; gap: how far their paths are
+    apart, None if paths were not wanted or the files have different coordinates."""
 
     examined: tuple[Examined, ...]
     comparison: Comparison | None
@@ -73,18 +74,18 @@ class Twins:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the files."""
+        """Names of the model files."""
         return tuple(each.name for each in self.examined)
 
     @property
     def alike(self) -> bool:
-        """Whether nothing differs."""
+        """Whether all builds agree with their files, and both files with each other."""
         files = all(each.certified for each in self.examined)
         return files and (self.comparison is None or self.comparison.alike)
 
 
 def check_asked(files: Sequence[Path], page: Path | None) -> None:
-    """InputError for too many files, and for a page that cannot be written."""
+    """Raise InputError for too many files, or for a page that cannot be written."""
     if len(files) > 2:
         raise InputError("FILES", "", len(files), "files: one, or two to be compared")
     if page is None:
@@ -96,12 +97,12 @@ def check_asked(files: Sequence[Path], page: Path | None) -> None:
 
 
 def kinds(text: str) -> tuple[str, ...]:
-    """Kinds of content in an option: names between commas."""
+    """The kinds of content that an option lists, separated by commas."""
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
 def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell: Tell = _silent) -> Twins:
-    """Certify each file, and compare two; InputError for what cannot be read or built.
+    """Certify each file, and compare both if there are two; raises InputError if a file cannot be read or built.
 
     tell : told what is done now, and which part of all.
     """
@@ -134,12 +135,13 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
 
 
 def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
-    """Tell the share of one file as one of all."""
+    """Report the progress within one file as a share of that of all files."""
     tell(what, (number + share) / parts)
 
 
 def _examined(file: ModelFile, table: ControlTable | None, wanted: Wanted, tell: Tell) -> Examined:
-    """One file: the certificate is a third of the work, paths another one, the price the last."""
+    """Certify one file, then compare its paths and price its accuracy if wanted. Each of these counts as a third of the
+    progress."""
     agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
     explained = {each.build: culprits(file.twin, each.build) for each in agreements if not each.alike}
     lost = misread(file) if file.document.kind == "URDF" else []
@@ -159,7 +161,8 @@ def _examined(file: ModelFile, table: ControlTable | None, wanted: Wanted, tell:
 
 
 def _constraints(file: ModelFile, count: int) -> Iterator[str]:
-    """Limits that states strike, what is soft in MuJoCo, and how far that is from the law of the other builds."""
+    """Lines on joint limits that are exceeded in the test states, on dry friction, and on constraints that are soft in
+    MuJoCo, with the difference that the softness makes to accelerations."""
     twin = file.twin
     beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.limited else []
     if any(beyond):
@@ -180,7 +183,7 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
 
 
 def lines(twins: Twins) -> list[str]:
-    """What the terminal shows."""
+    """Lines for the terminal."""
     rows = list[str]()
     for each in twins.examined:
         rows += _file_lines(each)
@@ -189,7 +192,7 @@ def lines(twins: Twins) -> list[str]:
 
 
 def verdict(each: Examined) -> str:
-    """One sentence on a file."""
+    """Sentence with the verdict on a file."""
     worst = max(row.acceleration for row in each.agreements)
     if each.misread:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"

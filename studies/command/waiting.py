@@ -37,14 +37,15 @@ Tell = Callable[[str, float], None]
 
 
 class Kernels:
-    """numba's compilations: how long they took in all, and since when one is under way. Numba asks for both methods."""
+    """Timer of numba's compilations: their total time, and since when one is running. Numba calls ``on_start`` and
+    ``on_end``."""
 
     def __init__(self) -> None:
         self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
         self._remove: Callable[[], None] = lambda: None
 
     def attach(self) -> None:
-        """Listen once numba is there; it is not imported for this."""
+        """Register for numba's compilation events if numba has been imported already; this call does not import it."""
         if self.attached or "numba.core.compiler_lock" not in sys.modules:  # which has imported the events
             return
         event: Any = sys.modules["numba.core.event"]
@@ -53,7 +54,7 @@ class Kernels:
         self.attached, self._remove = True, lambda: event.unregister(LOCK, listener)
 
     def detach(self) -> None:
-        """Listen no more."""
+        """Stop listening to numba's compilation events."""
         self._remove()
 
     def _start(self, *event: Any) -> None:
@@ -67,11 +68,11 @@ class Kernels:
             self.total += time.monotonic() - self.since
 
     def spent(self) -> float:
-        """s of all compilations so far."""
+        """Time (s) spent in all compilations so far, the running one included."""
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
     def busy(self) -> bool:
-        """Whether a kernel is being compiled that the bar shows."""
+        """Whether a compilation has been running long enough for the progress bar to show it."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW_COMPILATION
 
 
@@ -90,11 +91,11 @@ class Waiting:
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Set the bar's text to the work that begins, and its share to the part that is done."""
+        """Set the text of the bar to the task that begins, and its share to the finished part."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
-        """Text, share and time left of now; no share where nothing is known of it."""
+        """Text, finished share and remaining time to show now; the share is None where it is unknown."""
         if self.kernels.busy():
             spent, most = self.kernels.spent(), COMPILING.get(self.system, 0.0)
             share = spent / most if most > spent else None
@@ -112,12 +113,12 @@ class Waiting:
 
 
 def _remaining(share: float, seconds: float) -> float | None:
-    """s left of a work of which a share took so many seconds."""
+    """Remaining seconds of a task of which ``share`` took ``seconds``; None while the share is too small to tell."""
     return seconds * (1.0 - share) / share if share > KNOWN_SHARE else None
 
 
 def _time_left_text(seconds: float | None, spent: float) -> str:
-    """The time left in words, or the time so far where it is not known."""
+    """Text of the remaining time or, if it is unknown, of the elapsed time."""
     return f"{_duration_text(spent)} so far" if seconds is None else f"{_duration_text(seconds)} left"
 
 
@@ -127,7 +128,8 @@ def _duration_text(seconds: float) -> str:
 
 @contextmanager
 def waiting(text: str, system: str = "") -> Iterator[Tell]:
-    """A bar on the terminal for the block, if it takes longer than BAR_DELAY; what it gives is to be told what is done.
+    """Context that shows a progress bar on the terminal if the block takes longer than BAR_DELAY. It yields the
+    function to which the block reports its progress.
 
     Nothing is written, and no thread runs, where stderr is no terminal.
     """

@@ -24,7 +24,8 @@ DIM = 0.4
 
 @dataclass(frozen=True)
 class Camera:
-    """An eye that looks at a target (m), with the direction ``up``; opening : the picture's height in rad."""
+    """A camera at ``eye`` that looks at ``target`` (both in m); ``up``: vector that points upward in the picture;
+    opening: vertical angle of view (rad)."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -33,7 +34,7 @@ class Camera:
 
     @cached_property
     def axes(self) -> np.ndarray:
-        """Rows: to the right, up, back to the spectator."""
+        """Unit vectors (3, 3) of the camera as rows: right, up, and from the target back to the camera."""
         back = np.subtract(self.eye, self.target)
         back /= np.linalg.norm(back)
         right = np.cross(self.up, back)
@@ -45,13 +46,15 @@ class Camera:
         return height / (2.0 * np.tan(self.opening / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target))))
 
     def horizon(self, height: int) -> float:
-        """Row (pixels from the top) of what is far away and level with the eye; negative above the picture."""
+        """Row (pixels from the top) of the horizon in a picture of this height; negative where it lies above the
+        picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
         return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
 
     def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (..., 2) and inverse distances (...) of points (..., 3); zero or negative behind the camera."""
+        """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
+        the inverse distance of a point behind the camera is negative."""
         seen = (points - self.eye) @ self.axes.T
         near = -1.0 / seen[..., 2]
         scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
@@ -59,7 +62,8 @@ class Camera:
 
 
 def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
-    """Image (h, w, 3) of surfaces before a sky, whose two colours are those of the picture's top and of the horizon.
+    """Image (h, w, 3) of surfaces in front of a sky, with the sky's two colours at the picture's top and at the
+    horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
@@ -81,7 +85,7 @@ def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, heig
 def _shaded(
     camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, depths and colours for ``paint``, of the triangles that lie before the eye."""
+    """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
     corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
@@ -95,7 +99,8 @@ def _shaded(
 
 @njit(cache=True, error_model="numpy")
 def within(start, growth, left, right):
-    """The part of columns from ``left`` to ``right`` in which start + column * growth is not negative."""
+    """First and last column between ``left`` and ``right`` for which start + column * growth is not negative; the first
+    is greater than the last where there is no such column."""
     if growth > 0.0:
         return max(left, -start / growth), right
     if growth < 0.0:
@@ -105,7 +110,8 @@ def within(start, growth, left, right):
 
 @njit(cache=True, error_model="numpy")
 def paint(corners, near, colours, image, nearest):
-    """Paint triangles into ``image`` (h, w, 3) where they lie before what is in ``nearest`` (h, w) already.
+    """Paint triangles into ``image`` (h, w, 3). A pixel is painted if the triangle is nearer to the camera than what
+    ``nearest`` (h, w), inverse distances (1/m), records there.
 
     corners (m, 3, 2) : pixels, x to the right, y down; near (m, 3) : inverse distances (1/m), which are linear in
     pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.

@@ -37,7 +37,7 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
 
 
 def lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Where each arrow of frame ``k`` begins and what it spans (3,), in m of the picture."""
+    """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
     spans = []
     for force in motion.arrows:
         place, turn = pose(motion, stage, force.body, k)
@@ -47,7 +47,8 @@ def lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, 
 
 
 def pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Place (3,) and turn (3, 3) at which a body is drawn: magnified about its place at rest."""
+    """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
+    rest are magnified, except for a wheel's spin."""
     rest = np.array(stage.rest[body])
     place, turn = rest + stage.magnified * (motion.places[body][k] - rest), motion.turns[body][k]
     if body in stage.wheels:

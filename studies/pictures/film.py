@@ -28,7 +28,8 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class FilmedMotion:
-    """Poses from one engine at times (f,) in s: places (f, 3) and turns (f, 3, 3) of each body, space from body.
+    """Motion from one engine at times (f,) in s: positions (f, 3) and rotations (f, 3, 3) of each body, from body to
+    space axes.
 
     run : the result that is drawn, where its system has one.
     """
@@ -71,7 +72,7 @@ class Strut:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Shapes of the bodies and of what stands around.
+    """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
     shapes : surfaces of each body in its own axes; rest : its place when nothing moves; magnified : how many times as
     large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is drawn as it
@@ -92,7 +93,8 @@ class Stage:
 
 
 def gaps(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
-    """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
+    """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
+    forces (N)."""
     places = [(place, second.places[name]) for name, place in first.places.items()]
     turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
@@ -105,7 +107,8 @@ Poses = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) -> Poses:
-    """Poses by ``mj_kinematics`` at ``qpos`` (f, nq); ``bodies`` are MuJoCo's numbers of them."""
+    """Poses of bodies at MuJoCo's coordinates ``qpos`` (f, nq), by ``mj_kinematics``; ``bodies`` : MuJoCo's body
+    numbers."""
     import mujoco
 
     data, frames = mujoco.MjData(model), []
@@ -116,7 +119,8 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
 
 
 def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
-    """Poses at Exudyn's coordinates (f, n), in its own order; ``bodies`` answer for an output variable of Exudyn."""
+    """Poses of bodies at Exudyn's coordinates (f, n), in Exudyn's own order; each function in ``bodies`` returns a
+    body's value of an output variable of Exudyn."""
     import exudyn as exu
 
     kinds, frames = exu.OutputVariableType, []
@@ -127,7 +131,7 @@ def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates:
 
 
 def _poses(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
-    """Poses of place and turn of every body in every frame."""
+    """Position and rotation of every body over all frames."""
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)
     }

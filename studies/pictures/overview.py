@@ -63,7 +63,7 @@ def draw(path: Path) -> Path:
 
 
 def _run(engine: str, method: str, step: float) -> Result:
-    """A run by one method at one step."""
+    """A run by one method with one step."""
     scene = build(SCENE | {"engines": {engine: {"integrator": method, "step": step}}})
     return run(scene, engine)
 
@@ -78,7 +78,8 @@ def _forces(axis: Any, runs: dict[str, Result]) -> None:
 
 
 def _gaps(axis: Any, runs: dict[str, Result]) -> None:
-    """Difference of each engine from the reference, by the largest force."""
+    """Plot the largest difference of each engine's force from the reference up to each time, divided by the largest
+    force."""
     reference = runs["reference"]
     largest = np.abs(reference[FORCE]).max()
     for engine in ("exudyn", "mujoco"):
@@ -93,7 +94,8 @@ def _gaps(axis: Any, runs: dict[str, Result]) -> None:
 
 
 def _prices(axis: Any) -> None:
-    """Largest error of the force by its largest value over force calls: classical Runge-Kutta, and usual solvers."""
+    """Plot the relative error of the force over the number of force calls, for the classical Runge-Kutta method and for
+    each engine's usual solver."""
     truth = _run("reference", "RK4", REFERENCE_STEP)
     curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
@@ -109,14 +111,15 @@ def _prices(axis: Any) -> None:
 
 
 def _price(result: Result, truth: Result, step: float) -> tuple[float, float]:
-    """Force calls of a run, and the largest error of its force at common times by the largest force."""
+    """Number of force calls of a run, and the largest error of its force at common times, divided by the largest
+    force."""
     rows, fine = round(GRID / step), round(GRID / REFERENCE_STEP)
     error = np.abs(result[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
     return float(result.counts()["force calls"]), float(error)
 
 
 def _draw_overview(axis: Any) -> None:
-    """The vehicle on its road, and what becomes of one scene file."""
+    """Draw the vehicle on its road, and how one scene file is run by three engines whose results are compared."""
     axis.set(xlim=(0, 24), ylim=(0, 4.2), aspect="equal")
     axis.axis("off")
     x = np.linspace(0.0, 8.2, 300)

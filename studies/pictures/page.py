@@ -45,7 +45,7 @@ class Page:
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _draw(self) -> None:
-        """All that does not move."""
+        """Draw everything that is the same in all frames."""
         stage, motions = self.stage, self.motions
         no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
         self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout=no_layout)
@@ -81,11 +81,12 @@ class Page:
         return page
 
     def tallest(self) -> int:
-        """The frame in which the plotted forces are largest."""
+        """Number of the frame in which the plotted forces are largest."""
         return int(np.abs(np.column_stack(self._forces[0])).sum(axis=1).argmax())
 
     def _legend(self) -> None:
-        """An arrow of each kind as long as its round force is at the camera's target, and what is drawn."""
+        """Draw the legend: an arrow for each kind of force with the length that its legend force (N) has at the
+        camera's target, and the stage's caption."""
         row, left = 1 - (TOP + TALL + 20) / HEIGHT, float(EDGE)
         for name, kind in self.stage.kinds.items():
             length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
@@ -108,7 +109,7 @@ class Page:
         self._figure.text(1 - EDGE / WIDTH, row, self.stage.caption, ha="right", va="center")
 
     def _curves(self) -> Axes:
-        """Axes with the plotted forces in kN: a line of the first engine, dots of the second one."""
+        """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others."""
         axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 128 / HEIGHT))
         first, curve = self.motions[0], self.stage.curve
         names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
@@ -134,7 +135,8 @@ TONES = (DARK, PINK, ORANGE, SKY, GREY)
 
 
 def difference(motions: list[FilmedMotion]) -> str:
-    """Sentence on how far two engines differ over the film; on the engine that drew it, for a single engine."""
+    """Sentence on the largest differences between two engines over the film; with a single engine, on which engine it
+    is."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
     places, turns, forces = gaps(*motions)
@@ -145,5 +147,5 @@ def difference(motions: list[FilmedMotion]) -> str:
 
 
 def eight_bits(image: np.ndarray) -> np.ndarray:
-    """Colours from 0 to 1 as bytes."""
+    """Colours from 0 to 1 converted to bytes."""
     return (255.0 * image.clip(0.0, 1.0) + 0.5).astype(np.uint8)

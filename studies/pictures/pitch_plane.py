@@ -27,7 +27,7 @@ PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     run = {"duration": float(np.ceil(duration + DRAWN_ROAD / SPEED)), "step": 1e-3}
     scene = scene_of(
         {
@@ -58,7 +58,8 @@ def _mujoco(model: Any, states: np.ndarray) -> Poses:
 
 
 def _exudyn(model: Any, states: np.ndarray) -> Poses:
-    """Poses by Exudyn's nodes in its plane; wheels are points, which do not turn."""
+    """Poses of the bodies from the coordinates of Exudyn's nodes in the plane. Wheels are point masses, which do not
+    rotate."""
     import exudyn as exu
 
     mbs, nodes = model.built.mbs, model.built.nodes
@@ -78,13 +79,14 @@ def _exudyn(model: Any, states: np.ndarray) -> Poses:
 
 
 def _offset(assembly: Assembly, body: str) -> np.ndarray:
-    """Where a body is drawn when its coordinates are zero: the model counts heights from there and knows no x."""
+    """Position (3,) in m at which a body is drawn when its coordinates are zero. The model has no longitudinal
+    positions, and its heights count from here."""
     x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body)
     return np.array([0.0, 0.0, -HEIGHT]) if x is None else np.array([x, 0.0, -RADIUS])
 
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """The road's forces on the wheels and the suspension's on the chassis."""
+    """Arrows of the road's forces on the wheels and of the suspension's forces on the chassis."""
     up, (places, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])

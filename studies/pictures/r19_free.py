@@ -36,7 +36,7 @@ PERSON: Colour = (0.93, 0.76, 0.55)
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
     vehicle = reporting(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
@@ -100,7 +100,8 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 
 
 def _arrow(kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses) -> Arrow:
-    """A force along an axis of the space, at the road under the point of a body where a tyre or side force is."""
+    """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
+    on its body."""
     (x, y, _), body = place.point, place.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
     return Arrow(f"{kind}, {place.name}", kind, body, points, force[:, None] * np.eye(3)[axis])
@@ -121,7 +122,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
-    """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
+    """Surfaces of wheels at the tyres, a car around the chassis, and the engine and occupants inside."""
     person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
     return {
         **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
@@ -133,7 +134,7 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
 
 
 def _car(vehicle: SpatialVehicle) -> list[PaintedSurface]:
-    """Two convex outlines, through which one sees what is inside, about the chassis' own centre."""
+    """Transparent car body of two convex outlines, about the chassis' centre of mass."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
     lower = [

@@ -17,8 +17,8 @@ TILE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PassingRoad:
-    """Heights (m) at the ``distances`` (m) along the road and the lateral places ``tracks`` (m), passed with a speed
-    (m/s).
+    """A road that moves past the vehicle at a speed (m/s): heights (m) at ``distances`` (m) along it and lateral
+    positions ``tracks`` (m).
 
     up : the vertical component of the direction up, 1 or -1; magnified : of the heights; half : width (m).
     """

@@ -51,7 +51,8 @@ def patches(points: np.ndarray) -> np.ndarray:
 
 
 def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> PaintedSurface:
-    """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
+    """Solid of revolution about y from the outline (axial, radii), given from left to right. It is shaded smoothly
+    around the axis, with sharp edges at the outline's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     y, r = np.array(axial, float), np.array(radii, float)
     ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
@@ -88,8 +89,8 @@ def extruded(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurfac
 
 
 def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
-    """A horizontal square about the origin, made of tiles; tiles behind the camera are not drawn, and those near the
-    origin are small.
+    """A horizontal square about the origin, made of tiles that are small near the origin, because tiles that reach
+    behind the camera are not drawn.
 
     up : 1 where z is up, -1 where it is down.
     """
@@ -124,7 +125,7 @@ def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> Pa
 
 
 def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
-    """An arrow of exactly the vector's length (m); None where it is shorter than a tenth of its thickness."""
+    """An arrow as long as the vector (m); None if it is shorter than a tenth of its thickness."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:
         return None

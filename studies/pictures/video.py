@@ -14,7 +14,7 @@ PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
 def missing_extra(format_name: str) -> str:
-    """A sentence that names the extra where a film of this format needs it and it is not there; else empty."""
+    """Sentence that names the extra to install if a film format needs one that is missing; else empty."""
     if format_name == "png" or all(find_spec(name) for name in PACKAGES):
         return ""
     return (

@@ -35,7 +35,7 @@ SIDES = {"right": RIGHT, "left": LEFT}
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """The stage, and the motion of each engine at the steps that are nearest to ``times`` (s)."""
+    """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     return stage(CHOSEN), [_motion(engine, duration, times) for engine in engines]
 
 
@@ -71,7 +71,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
 
 
 def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
-    """Normal force and creep force on the wheels where they touch, of the contacts of a path."""
+    """Arrows of the normal force and of the creep force on both wheels, at the contact points along a path."""
     every = []
     for k, (name, side) in enumerate(SIDES.items()):
         cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
@@ -106,7 +106,7 @@ def stage(wheelset: Wheelset) -> Stage:
 
 
 def shapes(w: Wheelset) -> list[PaintedSurface]:
-    """An axle and two wheels, whose treads are the model's cones; flanges stand off by the magnified clearance."""
+    """Surfaces of an axle and two wheels with the model's conical treads. The flange clearance is drawn magnified."""
     end = w.half_spacing + 0.12
     surfaces = [revolved([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK)]
     inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
@@ -124,7 +124,7 @@ def shapes(w: Wheelset) -> list[PaintedSurface]:
 
 
 def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
-    """Rails, sleepers and ballast after a way (m)."""
+    """Surfaces of rails, sleepers and ballast after the wheelset has travelled a distance (m)."""
     first, last, top = -24.0, 2.4, w.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
     along = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z

@@ -37,7 +37,8 @@ def scene() -> tuple[SpatialVehicle, RoadPath]:
 
 
 def rides(engine: str, steps: int) -> tuple[Job, Job]:
-    """Runs of a bare ride and of the car written for an engine, whose states (steps + 1, 14) pass the same guard."""
+    """Two runs of the bare ride in one engine, by twinrig's model and by the hand-written car. Both give states (steps
+    + 1, 14), and check them with the same guard."""
     vehicle, road = scene()
     table, rest, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
     model = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
@@ -56,8 +57,8 @@ def rides(engine: str, steps: int) -> tuple[Job, Job]:
 
 
 def copies(steps: int) -> tuple[Job, Job]:
-    """Copies of the bare car's small motion on roads of their own, and of the one whose equations are written out:
-    states (14, COPIES) at the end."""
+    """Two runs of COPIES linear cars on different random roads, by twinrig and by hand-written equations. Both give the
+    final states (14, COPIES)."""
     vehicle, road = scene()
     plain, roads = linearise(vehicle, road.speed), next(road.blocks(steps, COPIES, 0))
     laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
@@ -77,8 +78,8 @@ def copies(steps: int) -> tuple[Job, Job]:
 
 
 def ratio_of_rides(engine: str, steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Comparison with a ride built by hand, of an engine or the reference: largest difference of states (m, rad, m/s,
-    rad/s), and the ratio of seconds with its interval."""
+    """Compare twinrig with a hand-built ride in an engine or the reference: largest difference of the states (m, rad,
+    m/s, rad/s), and the ratio of computing times with its confidence interval."""
     jobs = copies(steps) if engine == "reference" else rides(engine, steps)
     ours, theirs = (job() for job in jobs)
     return float(np.abs(ours - theirs).max()), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

@@ -24,14 +24,15 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Pressures that rise in all brakes, within the supply of 6 bar."""
+    """Write a file of brake pressures that rise at all wheels and stay below the supply of 6 bar."""
     rows = (f"{time},{','.join([str(5.0 * time)] * 4)}" for time in (0.0, 0.5, 1.0))
     names = ",".join(f"pressure_{wheel} [bar]" for wheel in ("fl", "fr", "rl", "rr"))
     (folder / "pressures.csv").write_text("\n".join([f"time [s],{names}", *rows, ""]))
 
 
 def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
-    """Counts of what is handed to the run of a stop, and its path."""
+    """Numbers of components (lags, controllers, noisy signals, ...) in the model of a braking scene, and the path as
+    bytes."""
     from models.systems.braking.march import Braked
     from models.systems.braking.run import run
 
@@ -47,7 +48,7 @@ def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dic
 
 
 def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
-    """Counts of what a braking run is made of."""
+    """Numbers of components in the model of a braked vehicle and its controller."""
     from models.brake.controllers import CONTROLLERS
     from models.brake.pressure import resting_chambers
     from models.systems.braking.measured_pressures import MeasuredPressures

@@ -23,7 +23,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def counts_and_path(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the theory that computes, and forces at all motions."""
+    """Numbers of features that the contact theory of a scene uses, and the forces of all motions as bytes."""
     from models.contact.theories import Exact, ExactOnEllipse, LinearTheory, Simplified
     from models.systems.contact import run
 

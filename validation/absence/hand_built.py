@@ -17,7 +17,7 @@ Run = Callable[[], np.ndarray]
 
 
 def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
-    """Runge-Kutta 4 in Exudyn; x is counted backward in its plane."""
+    """A run in Exudyn by the classical Runge-Kutta method. Exudyn's x axis in the plane points backward."""
     import exudyn as exu
     import exudyn.itemInterface as items
 
@@ -76,7 +76,8 @@ def exudyn_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run
 
 
 def exudyn_march(container: Any, mbs: Any, nodes: list[Any], step: float, steps: int) -> Callable[[], list[np.ndarray]]:
-    """Runge-Kutta 4; one run gives the coordinates of every node, then their rates, each with times first."""
+    """March a model in Exudyn by the classical Runge-Kutta method. Returns the coordinates of every node, then their
+    rates, each with the times in the first column."""
     import exudyn as exu
     import exudyn.itemInterface as items
 
@@ -110,7 +111,7 @@ def mujoco_model(p: Parameters, step: float) -> Any:
 
 
 def mujoco_run(p: Parameters, start: np.ndarray, step: float, steps: int) -> Run:
-    """Runge-Kutta 4 in MuJoCo."""
+    """A run in MuJoCo by the classical Runge-Kutta method."""
     import mujoco
     from mujoco import rollout
 

@@ -28,8 +28,8 @@ MOST_PARTS = 64
 
 
 class Truck(NamedTuple):
-    """A truck on its tyres: place of the wheels (m), their loads (N), radii (m), inertias (kg m^2), its mass (kg) and
-    inertia (kg m^2), its tyres, and cosine and sine of the angle by which the front wheels are steered."""
+    """A truck with four wheels: their positions (m), loads (N), radii (m) and inertias (kg m^2); mass (kg), yaw inertia
+    (kg m^2), tyre tables; cosine and sine of the front wheels' steer angle."""
 
     x: np.ndarray
     y: np.ndarray
@@ -44,15 +44,15 @@ class Truck(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Length of a step (s), and the speed (m/s) below which slip angles are those of this one."""
+    """Length of a step (s), and the speed (m/s) below which slip angles are computed as at this speed."""
 
     time: float
     regular: float
 
 
 class Now(NamedTuple):
-    """The truck as it moves: x, y, heading and their rates (6,), accelerations (3,), turning of its wheels (4,), and
-    the reports (7, 4) of a step and of its parts."""
+    """Present state of the truck: x, y, heading and their rates (6,); accelerations (3,); angular velocities of the
+    wheels (4,). Reports (7, 4) of the wheels for a step, and their sums over the parts of a step."""
 
     state: np.ndarray
     accelerations: np.ndarray
@@ -62,7 +62,8 @@ class Now(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """A whole stop at the ends of its samples: times (n,), states (n, 6), turning (n, 4), reports (n, 7, 4)."""
+    """Recorded stop at the sample ends: times (n,), states (n, 6), wheels' angular velocities (n, 4), reports (n, 7,
+    4)."""
 
     times: np.ndarray
     states: np.ndarray
@@ -71,9 +72,9 @@ class Stop(NamedTuple):
 
 
 class Known(NamedTuple):
-    """State of each wheel within a step, each (4,): see ``models.brake.plane_records.Wheels``; where it heads, and arms
-    of its forces about the centre of mass. last, off (3,): accelerations of a round, and by how much they were off;
-    first (6,): state at the start; middle (4,): torques in the middle; ends (2, 4): at the ends of a part."""
+    """Workspace of a step. Arrays (4,) hold each wheel's state (see ``models.brake.plane_records.Wheels``), its
+    heading, and lever arms about the centre of mass. last, off (3,): accelerations of an iteration and their error;
+    first (6,): initial state; middle (4,): torques at mid-step; ends (2, 4): torques at the ends of a substep."""
 
     start: np.ndarray
     rate: np.ndarray
@@ -94,7 +95,7 @@ class Known(NamedTuple):
 
 
 def step_workspace() -> Known:
-    """Room for a step."""
+    """Zeroed arrays in which a step keeps its intermediate values."""
     wheels = {name: np.zeros(4) for name in Known._fields}
     others = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
     return Known(**{**wheels, **others, "cell": np.zeros(4, dtype=np.int64)})
@@ -102,7 +103,8 @@ def step_workspace() -> Known:
 
 @inlined
 def settle(now, regular, starts, truck, known):
-    """Fill what is known of the wheels at a state."""
+    """Compute each wheel's velocity, slip angle, heading and lever arms from the truck's state, and store them in
+    ``known``."""
     x, y, angles = truck.x, truck.y, truck.tables.angles
     vx, vy, r = now.state[3], now.state[4], now.state[5]
     c, s = truck.cosine, truck.sine
@@ -125,7 +127,7 @@ def settle(now, regular, starts, truck, known):
 
 @inlined
 def tyre(i, given, now, truck, known):
-    """Fill the report of a wheel by its torque, load and motion in a step."""
+    """Compute the forces, slip and angular velocity of wheel i at the end of a step, and store them in the report."""
     report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
     sign, cells = 1.0 if u0 >= 0.0 else -1.0, Cells(known.cell[i], known.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
@@ -147,7 +149,8 @@ def tyre(i, given, now, truck, known):
 
 @inlined
 def respond(now, before, after, step, truck, known):
-    """Accelerations by the tyres' forces over a step (s) between torques before and after, if they were those now."""
+    """Accelerations that the tyre forces cause over a step (s) in which the torques go from ``before`` to ``after``,
+    with wheel speeds extrapolated by the present accelerations."""
     accelerations, report = now.accelerations, report_of(now.report)
     ax, ay, turn = 0.0, 0.0, 0.0
     for i in range(4):
@@ -167,7 +170,7 @@ def respond(now, before, after, step, truck, known):
 
 @inlined
 def rounds(now, torques, step, truck, known):
-    """Find the accelerations that the tyres' forces give back; whether there are any."""
+    """Iterate until the accelerations agree with those that the tyre forces cause; returns whether this converged."""
     accelerations, last, off = now.accelerations, known.last, known.off
     left, before = math.inf, 0.0
     for n in range(PATIENCE):
@@ -191,7 +194,7 @@ def rounds(now, torques, step, truck, known):
 
 @inlined
 def rests(now, first, step, truck):
-    """Time within the step at which the truck stands, or -1 if it does not."""
+    """Time within the step at which the truck comes to rest, or -1 if it still moves at the end."""
     accelerations, mass, inertia = now.accelerations, truck.mass, truck.inertia
     speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
     if speed == 0.0 and not now.turning.any():
@@ -208,7 +211,7 @@ def rests(now, first, step, truck):
 
 @inlined
 def moved_state(now, time, known):
-    """Move the state from the start of a step on by a time (s)."""
+    """Advance the state by a time (s) from the start of the step."""
     state, first, accelerations = now.state, known.first, now.accelerations
     for a in range(3):
         state[3 + a] = first[3 + a] + time * accelerations[a]
@@ -217,8 +220,8 @@ def moved_state(now, time, known):
 
 @lean
 def go(now, torques, step, truck, known):
-    """One ``Step`` under torques (2, 4) at its ends; how long the truck still moves in it, -1 if no accelerations were
-    found."""
+    """Advance the truck by one ``Step`` with torques (2, 4) at its ends. Returns for how long the truck moved, or -1 if
+    the accelerations did not converge."""
     first, middle = known.first, known.middle
     for a in range(6):
         first[a] = now.state[a]
@@ -245,7 +248,8 @@ def go(now, torques, step, truck, known):
 
 @lean
 def in_parts(parts, now, torques, step, truck, known):
-    """``go`` in equal parts of a ``Step``; the report is their mean, and of times locked the sum."""
+    """Advance by a ``Step`` in equal substeps with ``go``. The report is the mean over the substeps; times of locking
+    are added."""
     rows, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
     sums[:] = 0.0
     for k in range(parts):
@@ -272,8 +276,8 @@ def in_parts(parts, now, torques, step, truck, known):
 
 @njit(cache=True, error_model="numpy")
 def march(now, torque, steps, step, truck, known, stop):
-    """Fill a ``Stop`` sample by sample, each of so many steps; the number of its samples, 0 if no accelerations were
-    found. torque (4,) is there from the first step's end on."""
+    """Fill a ``Stop`` sample by sample, with ``steps`` steps per sample. torque (4,) acts fully from the end of the
+    first step on. Returns the number of samples, or 0 if the accelerations did not converge."""
     torques = np.zeros((2, 4))
     torques[1] = torque
     stop.times[0], stop.states[0], stop.turning[0] = 0.0, now.state, now.turning
@@ -297,8 +301,8 @@ def march(now, torque, steps, step, truck, known, stop):
 
 
 def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], BrakingPath]:
-    """One stop from a speed (m/s) with the front wheels at an angle (rad) of the numbers of a bare vehicle
-    (``models.systems.braking.run.Braked``), in at most so many samples, the start included."""
+    """A hand-written stop from a speed (m/s) with steered front wheels (rad), built from the parameters of a bare
+    vehicle (``models.systems.braking.run.Braked``). It has at most ``samples`` samples, the start included."""
     plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
     truck = Truck(
         plane.place[:, 0].copy(),
@@ -341,7 +345,7 @@ Job = Callable[[], BrakingPath]
 
 
 def stops(speed: float) -> tuple[Job, Job]:
-    """Stops of a bare vehicle from a speed (m/s), built beforehand, and of the written one."""
+    """Two stops of the bare vehicle from a speed (m/s), ready to run: by twinrig and by the hand-written code."""
     scene = bare_scene(
         "braking", brakes={"supply": SUPPLY}, procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER}}
     )
@@ -354,13 +358,13 @@ def stops(speed: float) -> tuple[Job, Job]:
 
 
 def forces(path: BrakingPath) -> np.ndarray:
-    """Forces of the tyres along and across them (2, n - 1, W) in N."""
+    """Longitudinal and lateral forces (2, n - 1, W) in N of the W tyres, in the wheels' axes."""
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 
 def gap(ours: BrakingPath, theirs: BrakingPath) -> float:
-    """Largest difference of states (m, rad, m/s, rad/s), of the wheels' turning (rad/s), of the tyres' forces by the
-    largest one, and of pressures and torques by theirs."""
+    """Largest difference between two stops: of states (m, rad, m/s, rad/s) and wheel speeds (rad/s), and of tyre
+    forces, pressures and torques, these divided by their largest values."""
     shares = [
         np.abs(states - other).max() / np.abs(other).max()
         for states, other in (
@@ -373,6 +377,7 @@ def gap(ours: BrakingPath, theirs: BrakingPath) -> float:
 
 
 def ratio_of_stops(speed: float, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of a stop from a speed (m/s), see ``gap``, and the ratio of seconds with its interval."""
+    """Largest difference between twinrig's stop from a speed (m/s) and the hand-written one (see ``gap``), and the
+    ratio of computing times with its confidence interval."""
     jobs = stops(speed)
     return gap(*(job() for job in jobs)), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))

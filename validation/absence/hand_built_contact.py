@@ -27,7 +27,7 @@ CALLS = 200
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def forces(axis, limit, along, across, halves, shares, bound):
-    """fx, fy (N) of a contact of two equal semi-axes (m).
+    """Creep forces fx, fy (N) on a circular contact area of radius ``axis`` (m).
 
     limit : friction by load (N); along, across : creepages by their flexibilities (N/m^3); halves, shares (n,) : half
     length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear divided by that in
@@ -50,7 +50,8 @@ def forces(axis, limit, along, across, halves, shares, bound):
 
 
 def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
-    """The product's call and the written one, CALLS times: fx, fy (N)."""
+    """Two functions that compute the same contact CALLS times, by twinrig and by hand-written code, and return fx, fy
+    (N)."""
     pair = MaterialPair()
     product = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
     flexible = tuple(float(value) for value in flexibilities(AXIS, AXIS, pair))[:2]
@@ -72,7 +73,8 @@ def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
 
 
 def ratio_of_contacts(rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of the forces by the largest force there can be; the ratio of seconds, its interval."""
+    """Largest difference of the creep forces between twinrig and the hand-written code, divided by the friction limit;
+    ratio of computing times with its confidence interval."""
     jobs = calls()
     ours, theirs = (job() for job in jobs)
     gap = float(np.abs(ours - theirs).max()) / (FRICTION * LOAD)

@@ -35,7 +35,8 @@ TOUCH = size_of(CONTACT)
 
 @lean
 def law(numbers, t, q, v, f):
-    """Add the forces to ``f`` (23,); all but the time are pointers to doubles: the table, positions, rates."""
+    """Add the generalised forces of the hand-written car to ``f`` (23,). All arguments but the time are pointers to
+    doubles: the parameter table, coordinates, rates and forces."""
     head, q, v, f = array(numbers, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(f, (SIZE,))
     wheels, mounts = beyond(numbers, HEAD), beyond(numbers, HEAD + 4 * WHEEL)
     cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
@@ -88,7 +89,7 @@ def law(numbers, t, q, v, f):
 
 @lean
 def _wheel(w, frame, passing, q, v, i, left):
-    """Springs and load of wheel i, and its creepages; moment on the chassis about S.
+    """Compute spring forces, load and creepages of wheel i. Returns the moment of the springs on the chassis about S.
 
     passing : speeds of S ahead and aside, its place ahead of the origin. left : where places, pushes and contacts of
     all wheels are left.
@@ -115,7 +116,8 @@ def _wheel(w, frame, passing, q, v, i, left):
 
 @lean
 def _bar(bar, i, left, q, f):
-    """A bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the chassis' roll."""
+    """Add the forces of an anti-roll bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the
+    chassis' roll."""
     (stiffness, held, by), (places, pushes, _) = bar, left
     twist = held + stiffness * (q[4] - (row(places, 3, i)[2] - row(places, 3, i + 1)[2]) * by)
     f[4] -= twist
@@ -125,7 +127,7 @@ def _bar(bar, i, left, q, f):
 
 @lean
 def _engine(mounts, head, frame, q, v, f):
-    """The engine on its mounts; moment on the chassis about S."""
+    """Add the forces of the mounts on the engine's three coordinates. Returns their moment on the chassis about S."""
     x, y, z, turning = frame
     c_roll, s_roll, c_pitch, s_pitch = math.cos(q[7]), math.sin(q[7]), math.cos(q[8]), math.sin(q[8])
     over = plus(times(y, c_roll), times(z, s_roll))
@@ -156,7 +158,7 @@ def _engine(mounts, head, frame, q, v, f):
 
 @lean
 def _add_seat_forces(seats, frame, q, v, f):
-    """Add the forces of both seats; moment on the chassis about S."""
+    """Add the forces of both seats on their coordinates. Returns their moment on the chassis about S."""
     _, _, z, turning = frame
     moment = 0.0, 0.0, 0.0
     for i in range(2):
@@ -169,7 +171,8 @@ def _add_seat_forces(seats, frame, q, v, f):
 
 
 def numbers_of(handling: Handling) -> np.ndarray:
-    """The car's table: head, wheels, mounts, seats, net."""
+    """The car's parameters as one array: general ones, then those of the wheels, the engine mounts, the seats and the
+    grid of the contact patch."""
     car, of, held = handling.vehicle, net(CELLS), handling.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, held[bar.name], 1.0 / bar.track)]
@@ -221,7 +224,8 @@ def numbers_of(handling: Handling) -> np.ndarray:
 
 
 def model_of(handling: Handling, step: float) -> mujoco.MjModel:
-    """The car in MuJoCo, the table among its numbers; bodies without inertia get it as the model is there."""
+    """The car's model in MuJoCo, which carries the parameter table; bodies without inertia get it when the model
+    exists."""
     car, table = handling.vehicle, numbers_of(handling)
     chassis = car.body("body")
     bodies = "".join(
@@ -257,7 +261,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
 
 
 def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
-    """One run from positions and rates (23,) that gives states (steps + 1, 46)."""
+    """A hand-written run from coordinates and rates (23,); the returned function gives states (steps + 1, 46)."""
     built = model_of(handling, step)
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(law)
 

@@ -24,7 +24,8 @@ Run = Callable[[], np.ndarray]
 
 @dataclass(frozen=True)
 class Car:
-    """Places (m) count from the body's centre; corners (4, 5): x, y, z of a strut, its stiffness and damping."""
+    """Parameters of a car with four wheels. Positions (m) are relative to the body's centre of mass; corners (4, 5): x,
+    y, z of each strut, its stiffness and its damping."""
 
     mass: float
     inertia: tuple[float, float, float]
@@ -35,7 +36,7 @@ class Car:
 
     @classmethod
     def of(cls, vehicle: SpatialVehicle) -> "Car":
-        """The numbers of a vehicle of this kind."""
+        """Parameters of the car, read from a vehicle of this kind."""
         body, wheel = vehicle.bodies[:2]
         corners = [[*np.subtract(s.first_point, body.position), s.stiffness, s.damping] for s in vehicle.springs]
         return cls(
@@ -49,7 +50,8 @@ class Car:
 
 
 def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
-    """Runge-Kutta 4 in Exudyn; ``road`` (2 steps + 1, 4): heights (m) at half steps."""
+    """A run in Exudyn by the classical Runge-Kutta method; ``road`` (2 steps + 1, 4): heights (m) under the wheels at
+    half steps."""
     import exudyn as exu
     import exudyn.itemInterface as typed_items
 
@@ -115,7 +117,8 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
 
 
 def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
-    """Runge-Kutta 4 in MuJoCo; ``road`` as for Exudyn."""
+    """A run in MuJoCo by the classical Runge-Kutta method; ``road`` (2 steps + 1, 4): heights (m) under the wheels at
+    half steps."""
     import mujoco
     from mujoco import rollout
 
@@ -174,8 +177,8 @@ STATES, BODY, CORNER = 14, 4, 5
 
 @lean
 def rates(x, road, car, out):
-    """Rates (14,) of a state of small motion on heights (4,); ``car``: mass of body and wheel, roll and pitch inertia,
-    then x, y, stiffness, damping and tyre stiffness of every corner."""
+    """Time derivatives (14,) of the state of a linear car on road heights (4,). ``car`` holds masses of body and wheel,
+    roll and pitch inertia, then x, y, stiffness, damping and tyre stiffness of every corner."""
     lift = roll = pitch = 0.0
     for i in range(4):
         k = BODY + CORNER * i
@@ -191,8 +194,8 @@ def rates(x, road, car, out):
 
 @njit(cache=True, error_model="numpy")
 def march(states, roads, step, car):
-    """The classical Runge-Kutta method, one of the copies (14, copies) after the other, over roads (2 steps + 1, 4,
-    copies)."""
+    """March each copy by the classical Runge-Kutta method, one after the other, and overwrite ``states`` (14, copies).
+    roads (2 steps + 1, 4, copies): heights (m) at half steps."""
     rate, total, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     for copy in range(states.shape[1]):
         x, road = states[:, copy].copy(), roads[:, :, copy].copy()
@@ -212,7 +215,7 @@ def march(states, roads, step, car):
 
 
 def numbers(car: Car) -> np.ndarray:
-    """A car's numbers for ``rates``."""
+    """A car's parameters in the order that ``rates`` expects."""
     corners = np.column_stack([car.corners[:, [0, 1, 3, 4]], np.full(4, car.tyre)])
     return np.concatenate([[car.mass, car.wheel, car.inertia[0], car.inertia[1]], corners.ravel()])
 

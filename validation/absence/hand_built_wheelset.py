@@ -23,9 +23,9 @@ SIZE = size_of(REPORT)
 
 @lean
 def rates(state, speed, p, told, out, report):
-    """Rates (10,) of y, z, roll, yaw, angle of spin and of their rates; report (2, 18) of the contacts, if it is told;
-    p: mass, inertias along and across, weight of each side, radius, half gauge, conicity, head radius, modulus, shear
-    modulus, Poisson's ratio."""
+    """Time derivatives (10,) of a wheelset's state: y, z, roll, yaw, spin angle, and their rates. If ``told``, the two
+    contacts are written to report (2, 18). p: mass, inertias about the track's direction and the axle, weight on each
+    side, radius, half gauge, conicity, rail head radius, contact modulus, shear modulus, Poisson's ratio."""
     mass, along, across, carried, radius, gauge, conicity, head, modulus, shear, poisson = p
     cone = Cone(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
@@ -86,7 +86,8 @@ def rates(state, speed, p, told, out, report):
 
 @njit(cache=True, error_model="numpy")
 def march(state, speed, step, p, path, reports):
-    """The classical Runge-Kutta method from a state (10,); fills path (steps + 1, 10), reports (steps + 1, 2, 18)."""
+    """March from a state (10,) by the classical Runge-Kutta method; fills path (steps + 1, 10) and reports (steps + 1,
+    2, 18)."""
     total, rate, here = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     path[0] = state
     for i in range(len(path)):
@@ -103,8 +104,8 @@ def march(state, speed, step, p, path, reports):
 
 
 def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], Any]:
-    """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts,
-    REPORT (steps + 1, 2)."""
+    """A hand-written run of a free wheelset (``models.rail.wheelset``). The returned function gives states (steps + 1,
+    10) and contacts, REPORT (steps + 1, 2)."""
     w = wheelset
     p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *rails_of(w).wheels[0].tolist()[:7])
 

@@ -16,7 +16,7 @@ BARE_SCENE: dict[str, Any] = {
 
 
 def counts_and_path(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of a manoeuvre as both engines are handed it, and its path."""
+    """Numbers of components in the model of a manoeuvre as both engines receive it, and the path as bytes."""
     path = run(scene, engine)
     handling = path.detail.handling
     controls = (handling.controls.steer, handling.controls.brake, handling.controls.drive)

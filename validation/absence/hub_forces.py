@@ -37,7 +37,8 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Forces that carry the vehicle, one of them rising, and angles of a vehicle that stands."""
+    """Write files of hub forces that carry the vehicle, with a vertical force that rises, and of angles that stay
+    zero."""
     rising = np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2
     forces = {
         f"{hub}_{name}": (next(iter(units)), (4e3 + 500.0 * rising) * (name == "fz"))
@@ -50,7 +51,8 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the scene's run, as an engine is handed it, and its path."""
+    """Numbers of features (noisy columns, held forces, ...) in the run as an engine receives it, and the path as
+    bytes."""
     measurement, step = measure(scene, engine), scene.run.step
     hub_inputs = measurement.hub_inputs(scene.stabilise.method, step, STEPS)
     model = build(engine, measurement.vehicle, hub_inputs, step, scene.run.duration)
@@ -73,13 +75,13 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
 
 
 def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
-    """A run of the scene over so many of its steps, built beforehand."""
+    """A run of the scene over ``steps`` of its steps, with its model built already."""
     measurement, step = measure(scene, engine), scene.run.step
     return build(engine, measurement.vehicle, measurement.hub_inputs("none", step, steps), step, steps * step).run
 
 
 def _noisy(measurement: Measurement) -> list[int]:
-    """Columns of forces and of angles that are not those of the true run; none of files, which have no true one."""
+    """Numbers of force columns and of angle columns that contain noise; 0 and 0 for measurements from files."""
     forces, angles, scene = measurement.forces, measurement.angles, measurement.scene
     if measurement.truth is None:
         return [0, 0]

@@ -23,7 +23,7 @@ STEP, SHORT_RUN_STEPS = 5e-4, 40
 
 
 def arrays(job: Callable[[], Any]) -> int:
-    """Arrays that compiled code makes in a job, by numba's own count."""
+    """Number of arrays that compiled code allocates during a job, as counted by numba."""
     _nrt_python.memsys_enable_stats()
     try:
         before = rtsys.get_allocation_stats().alloc
@@ -34,8 +34,8 @@ def arrays(job: Callable[[], Any]) -> int:
 
 
 def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
-    """Runs of a bare wheelset and of one written out for linear creep on cones alone, whose path passes the same
-    checks: both give states and contacts."""
+    """Two runs of the bare wheelset, by twinrig and by code written for linear creep on cones alone. Both check the
+    path in the same way, and give states and contacts."""
     equations, times = equations_of(bare_scene("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
     start = equations.displaced(1e-3)
     theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
@@ -50,7 +50,8 @@ def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], Whee
 
 
 def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference of states and contact forces (m, rad, m/s, rad/s; shares of the load), ratio of seconds."""
+    """Largest difference of states (m, rad, m/s, rad/s) and contact forces (ratio to the load) between twinrig's
+    wheelset and the hand-written one; ratio of their computing times."""
     jobs = wheelsets(steps)
     ours, theirs = (job() for job in jobs)
     gaps = [np.abs(ours.contacts[name] - theirs.contacts[name]).max() for name in ("load", "fx", "fy", "mz")]
@@ -62,7 +63,7 @@ def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, flo
 def arrays_per_steps(
     job: Callable[[int], Callable[[], Any]], short: int = SHORT_RUN_STEPS, long: int = 10 * SHORT_RUN_STEPS
 ) -> int:
-    """Arrays that more steps of a job make; job(steps) gives it."""
+    """How many more arrays a job allocates in ``long`` steps than in ``short`` ones; ``job(steps)`` builds the job."""
     jobs = [job(steps) for steps in (short, long)]
     for warm in jobs:
         warm()
@@ -71,22 +72,23 @@ def arrays_per_steps(
 
 
 def made_by_wheelset(which: int) -> int:
-    """Arrays that more steps of the bare wheelset (0) or the written one (1) make."""
+    """How many more arrays a longer run allocates: 0 for twinrig's bare wheelset, 1 for the hand-written one."""
     return arrays_per_steps(lambda steps: wheelsets(steps)[which])
 
 
 def made_by_ride() -> int:
-    """Arrays that more steps of a bare ride make, in MuJoCo, where all its forces are compiled, and as copies."""
+    """How many more arrays a longer run of the bare ride allocates: in MuJoCo, where all its forces are compiled, and
+    as linear copies."""
     return arrays_per_steps(lambda steps: rides("mujoco", steps)[0]) + arrays_per_steps(lambda steps: copies(steps)[0])
 
 
 def made_by_car() -> int:
-    """Arrays that more steps of a bare car of a scene of handling make in MuJoCo."""
+    """How many more arrays a longer run of the bare car of ``handling`` allocates in MuJoCo."""
     return arrays_per_steps(lambda steps: cars(steps)[0])
 
 
 def made_by_hubs(engine: str) -> int:
-    """Arrays that more steps of a bare vehicle driven by its hub forces make."""
+    """How many more arrays a longer run of a bare vehicle driven by hub forces allocates."""
     scene = bare_scene("hub-forces")
     most = hub_forces.STEPS
     most = hub_forces.STEPS
@@ -94,7 +96,7 @@ def made_by_hubs(engine: str) -> int:
 
 
 def made_by_braking(engine: str) -> tuple[int, int]:
-    """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
+    """How many more arrays a longer run of a bare braked vehicle allocates, and by how many samples it is longer."""
     from models.systems.braking.run import run
 
     slow, fast = (
@@ -109,7 +111,7 @@ def made_by_braking(engine: str) -> tuple[int, int]:
 
 
 def rows() -> list[Row]:
-    """Arrays made in the loops of bare scenes."""
+    """Report rows: numbers of arrays that the time loops of bare scenes allocate, which must be none."""
     made, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
     why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
     counted = {

@@ -57,7 +57,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Forces that carry the vehicle, and angles of a vehicle that leans to and fro."""
+    """Write files of hub forces that carry the vehicle, and of angles of a vehicle that sways."""
     swing = np.sin(np.linspace(0.0, 3.0, SAMPLES))
     forces = dict.fromkeys(HUBS, ("N", 4000.0 + 100.0 * swing))
     angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in ANGLES.items()}
@@ -65,7 +65,8 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the run that a recording drives, as an engine is handed it, and its answers."""
+    """Numbers of features in the run driven by a recording, as an engine receives it, and the computed channels as
+    bytes."""
     tables, build = list[np.ndarray](), section_run.build
 
     def watched(*settings: Any) -> Any:

@@ -32,7 +32,8 @@ Counts = dict[str, dict[str, int]]
 
 
 def file_of(system: str) -> Any:
-    """BARE, ENGINES and counts_and_path(scene, engine) -> counts and path of a system.
+    """The module that describes a system's bare scene. It has BARE_SCENE, ENGINES, and counts_and_path(scene, engine),
+    which returns counts and path.
 
     If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
     scene has in place of its own tables without such an effect, and with it.
@@ -41,27 +42,28 @@ def file_of(system: str) -> Any:
 
 
 def bare_scene(system: str, **instead: Any) -> Any:
-    """The bare scene of a system, with some tables in place of its own."""
+    """The bare scene of a system. Keyword arguments replace tables of the scene."""
     table = {**file_of(system).BARE_SCENE, **instead}
     return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_folder(system).name))
 
 
 @cache
 def _folder(system: str) -> tempfile.TemporaryDirectory[str]:
-    """Files that scenes of a system read, as long as this process lives."""
+    """A temporary folder with the files that scenes of a system read; it lasts as long as this process."""
     folder = tempfile.TemporaryDirectory()
     getattr(file_of(system), "write", lambda place: None)(Path(folder.name))
     return folder
 
 
 def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
-    """Tables in place of those of the bare scene, without and with an effect that has no usual values."""
+    """For each effect without usual values: tables that replace those of the bare scene, once without and once with the
+    effect."""
     return getattr(file_of(system), "BY_HAND", {})
 
 
 def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
-    """Counts and path of a scene in each engine that does not refuse it, or in the first one; the counts of Exudyn and
-    MuJoCo with the callbacks that were there while it ran."""
+    """Counts and path of a scene, by engine: all that do not refuse it, or only the first one if ``quick``. In Exudyn
+    and MuJoCo the largest number of callbacks during the run is counted, too."""
     file, seen_by_engine = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
         with suppress(Refused), registered(engine) as callbacks:
@@ -71,7 +73,7 @@ def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, 
 
 
 def controlled(system: str) -> tuple[str, ...]:
-    """Effects that can be put into a bare scene, by their usual values or by hand."""
+    """Effects that can be added to a bare scene, with their usual values or with tables written by hand."""
     modules = {name: module_of(system, name) for name in names_of(system)}
     return tuple(
         name
@@ -81,7 +83,8 @@ def controlled(system: str) -> tuple[str, ...]:
 
 
 def pair(system: str, effect: str) -> tuple[Any, Any]:
-    """The bare scene, or that with what an effect needs, and the same with the effect."""
+    """Two scenes that differ by one effect: the bare scene with only the effects that this effect needs, and the same
+    with the effect."""
     if effect in by_hand(system):
         less, more = (bare_scene(system, **tables) for tables in by_hand(system)[effect])
         return less, more
@@ -96,7 +99,7 @@ def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
 
 
 def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
-    """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
+    """Counts that an effect adds, by engine: the difference between the two scenes of ``pair`` in engines that accept
     both."""
     before, after = (
         _counts_without_effect(system, effect, quick),
@@ -114,7 +117,7 @@ def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
 
 @cache
 def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
-    """Counts of a bare scene with some effects, or with tables of its own, as text."""
+    """Counts, by engine, of a bare scene with some of its tables replaced (``tables``, JSON) and some effects added."""
     scene = with_effects(bare_scene(system, **json.loads(tables)), *needs)
     return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
@@ -124,8 +127,8 @@ def _increases(counts_before: dict[str, int], counts_after: dict[str, int]) -> d
 
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
-    """Facts for the case, to be gathered in a fresh process: what a bare scene imports, what effects import and add,
-    whether the path stays."""
+    """Facts for the report, to be gathered in a fresh process: modules that bare scenes and effects import, counts that
+    effects add, and whether an effect's removal keeps the path."""
     modules_of = {
         system: sorted({module for some in _modules(system).values() for module in some}) for system in systems
     }
@@ -182,14 +185,15 @@ def _loaded(modules: list[str]) -> list[str]:
 
 @cache
 def measured_counts() -> dict[str, Any]:
-    """The facts of ``probed``, gathered in a process of its own."""
+    """The facts of ``probed``, computed in a process of their own."""
     code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
 
 def rows(quick: bool) -> list[Row]:
-    """Absence of every effect of every system, and a positive control of each; quick: of every third, in one engine."""
+    """Report rows: absence of every effect of every system, and a positive control of each; quick: every third effect,
+    in one engine."""
     if quick:
         return [
             row
@@ -264,7 +268,7 @@ def _present(system: str, added_counts: dict[str, Counts]) -> list[Row]:
 
 
 def _text(counts: Counts) -> str:
-    """The counts by engine, once where all agree."""
+    """Text of the counts by engine; a single text where all engines have the same counts."""
     said = {
         engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(counted.items())) for engine, counted in counts.items()
     }

@@ -39,14 +39,14 @@ print(json.dumps({
 
 
 def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
-    """Modules, compiled kernels and states (as hexadecimal bytes) after a run in a fresh process."""
+    """Modules imported, kernels compiled and states (as hexadecimal bytes) after a scene was run in a fresh process."""
     command = [sys.executable, "-c", PROBE, json.dumps(table), folder]
     done = subprocess.run(command, capture_output=True, text=True, check=True, **options)
     return json.loads(done.stdout.splitlines()[-1])
 
 
 def belongs_to_effects(module: str) -> bool:
-    """Whether a module exists for the sake of an effect: none of these may be imported for a bare scene."""
+    """Whether a module belongs to an effect: a bare scene must import no such module."""
     owners = (
         "models.systems.pitch_plane.effects.",
         "models.road",
@@ -85,7 +85,7 @@ def installed() -> int:
 
 
 def march(engine: str, model: Model) -> MarchCounts:
-    """Run a model once and watch its engine march; the guard and the results around it are not counted."""
+    """Run a model once and count what its engine's march uses; the guard and the making of results are not counted."""
     seen = MarchCounts()
     with _entry(engine, seen):
         model.run()
@@ -93,7 +93,8 @@ def march(engine: str, model: Model) -> MarchCounts:
 
 
 def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
-    """The march that took the least memory of some: what a loop allocates shows in every one of them."""
+    """The march with the least memory among several runs. Memory that the time loop needs occurs in every run, so that
+    it is in the least, too."""
     return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.memory)
 
 
@@ -141,7 +142,7 @@ def _count(counts: MarchCounts, event: str) -> None:
 
 
 def _size(result: Any, given: Sequence[Any]) -> int:
-    """Bytes of the arrays that a march returned, without those that it was given to fill."""
+    """Bytes of the arrays that a march returned, except for those that it received as arguments and filled."""
     parts = result if isinstance(result, tuple) else (result,)
     arrays = [part for part in parts if isinstance(part, np.ndarray)]
     filled = [array for array in given if isinstance(array, np.ndarray)]
@@ -174,7 +175,8 @@ def _user_functions(mbs: Any) -> int:
 
 @contextmanager
 def registered(engine: str) -> Iterator[list[int]]:
-    """Callbacks in a block: of every Exudyn system that marches, or of MuJoCo whenever one is set or taken away."""
+    """Context in which callbacks are counted: for every Exudyn system that is marched, or whenever a MuJoCo callback is
+    set or cleared. It yields the list of counts."""
     functions, patches = list[int](), list[Any]()
     if engine == "mujoco":
         import mujoco

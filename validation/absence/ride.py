@@ -70,7 +70,7 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def write(folder: Path) -> None:
-    """Two tracks of a kilometre, of waves with amplitudes as their lengths."""
+    """Write road files of two tracks, a kilometre long, made of waves whose amplitudes grow with their lengths."""
     s = 0.5 * np.arange(2001)
     bends = 2.0 * np.pi / np.geomspace(1.5, 100.0, 60)
     turns = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (2, 60))
@@ -79,7 +79,8 @@ def write(folder: Path) -> None:
 
 
 def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of the linear system that a scene makes, and what is found of its outputs."""
+    """Numbers of features of the linear system that a scene leads to, and the standard deviations of its outputs as
+    bytes."""
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
         road = of_scene.excitation_of(scene, wheels(vehicle))
@@ -100,7 +101,7 @@ def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], byte
 
 
 def _with_fewest_copies() -> Any:
-    """Context with the smallest allowed number of copies."""
+    """Settings with the smallest allowed number of Monte Carlo copies."""
     from models.systems.ride.nonlinear import Sampling
 
     return Sampling(copies=2, lasting=0.1)
@@ -118,7 +119,7 @@ print(json.dumps(sorted(sys.modules)))
 
 
 def imported_modules(engine: str) -> list[str]:
-    """Modules of FOREIGN after a linear ride in a fresh process."""
+    """Modules of the list FOREIGN that have been imported after a linear ride in a fresh process."""
     command = [sys.executable, "-c", PROBE, engine]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     modules = json.loads(done.stdout.splitlines()[-1])
@@ -126,7 +127,7 @@ def imported_modules(engine: str) -> list[str]:
 
 
 def states(filters: dict[str, str]) -> int:
-    """States of R19-ride behind two road filters, with weightings."""
+    """Number of states of the vehicle R19-ride with two road filters and with weightings."""
     vehicle = _linear("r19_ride")
     return len(weighted(excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), filters).A)
 
@@ -141,7 +142,7 @@ def linearised(name: str) -> int:
 
 
 def noisy(damping: float) -> int:
-    """Outputs of the half car that white noise reaches at once, with this tyre damping (N s/m)."""
+    """Number of the half car's outputs that white noise enters directly, with this tyre damping (N s/m)."""
     half_car = load_vehicle("half_car")
     damped = replace(half_car, tyres=tuple(replace(tyre, damping=damping) for tyre in half_car.tyres))
     vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
@@ -150,7 +151,8 @@ def noisy(damping: float) -> int:
 
 
 def callbacks(name: str) -> dict[str, tuple[int, int]]:
-    """Curves and callbacks of a vehicle in both engines, Exudyn's counted over its own items."""
+    """Numbers of curves and of callbacks of a vehicle in both engines; Exudyn's are counted over the items of its
+    system."""
     counts = {}
     for engine in ("exudyn", "mujoco"):
         model = build(engine, load_vehicle(name))
@@ -166,7 +168,7 @@ def _linear(name: str) -> LinearVehicle:
 
 
 def rows(quick: bool = False) -> list[Row]:
-    """All counts, each beside its positive control; quick: without what a fresh process imports."""
+    """Report rows on all counts, each next to a positive control. quick: without the imports of a fresh process."""
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (callbacks(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"

@@ -33,7 +33,7 @@ BARE_SCENE: dict[str, Any] = {
 
 
 def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
-    """Counts of a wheelset, in its numbers and in what an engine builds of it, and its path."""
+    """Numbers of features of a wheelset, in its parameters and in an engine's model, and the path as bytes."""
     from models.systems.wheelset.of_scene import equations_of
     from models.systems.wheelset.run import run
 
@@ -55,7 +55,8 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
 
 
 def without_net(law: Any) -> str:
-    """Text: "the same" if the rates stay the same to the last bit where FASTSIM's net holds NaN, else "no numbers"."""
+    """Returns "the same" if the wheelset's rates do not change by a bit when FASTSIM's grid is filled with NaN, else
+    "no numbers"."""
     equations = Equations(CHOSEN, SPEED, law, 11)
     state, (speed, body, _), rails = equations.displaced(SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
@@ -65,7 +66,7 @@ def without_net(law: Any) -> str:
 
 
 def springs(wheelset: Wheelset) -> tuple[int, int]:
-    """Spring-dampers of Exudyn's system and actuators of MuJoCo's model."""
+    """Numbers of spring-dampers in Exudyn's system and of actuators in MuJoCo's model."""
     from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 
     exudyn, mujoco = (cast(Any, engine(wheelset, SPEED).model) for engine in (ExudynWheelset, MujocoWheelset))
@@ -75,7 +76,7 @@ def springs(wheelset: Wheelset) -> tuple[int, int]:
 
 
 def rows() -> list[Row]:
-    """All counts, each beside its positive control."""
+    """Report rows on all counts, each next to a positive control."""
     counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN, free_wheelset(CHOSEN))]
     return [
         behaves(

@@ -54,7 +54,8 @@ class ConstrainedBody:
         return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [about]])
 
     def solved(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (6,) of the centre and of turning, and the joint's force and moment (6,) about the centre."""
+        """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
+        centre."""
         m, turned = self.mechanism, _matrix(state[TURN])
         inertia = turned @ m.inertia @ turned.T
         turning = state[TURNING]
@@ -89,7 +90,7 @@ class ConstrainedBody:
         return out
 
     def _constraints(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (c, 6) by which accelerations enter the joint's second derivatives, and what they must come to (c,)."""
+        """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
         kind, turning = self.mechanism.kind, state[TURNING]
         turned = _matrix(state[TURN])
         arm = turned @ self.arm
@@ -117,12 +118,12 @@ class ConstrainedBody:
         return np.empty((0, 6)), np.empty(0)
 
     def at_motion(self, motion: BodyMotion, row: int) -> np.ndarray:
-        """State (14,) at a row of a motion; the angle about the joint's axis counts from there."""
+        """State (14,) of the body at a row of a motion; the angle about the joint's axis is zero there."""
         turned = Rotation.from_matrix(motion.turned[row]).as_quat()
         return np.concatenate([motion.place[row], turned, motion.velocity[row], motion.turning[row], [0.0]])
 
     def marched(self, state: np.ndarray, steps: int, step: float) -> np.ndarray:
-        """The state after some steps (s)."""
+        """State after ``steps`` steps of length ``step`` (s)."""
         for _ in range(steps):
             state = self._stepped(state, step)
         return state

@@ -29,7 +29,7 @@ BODY = "body"
 
 @dataclass(frozen=True, eq=False)
 class JointTree:
-    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in those of the ground."""
+    """A mechanism's chain of joints. axes (3, 3): the vehicle's axes as columns, in the ground's axes."""
 
     mechanism: Mechanism
     axes: np.ndarray
@@ -60,7 +60,7 @@ class JointTree:
         return SpatialVehicle("mechanism", (*held, body), (), (), ())
 
     def driven(self) -> Driven:
-        """What an engine builds."""
+        """The vehicle as the engines build it, with its springs as compiled forces."""
         vehicle = self.vehicle()
         springs = [
             replace(spring, ground=self.local(spring.ground), body=self.local(spring.body))
@@ -96,7 +96,8 @@ class JointTree:
         return rates
 
     def run(self, engine: str, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
-        """Motion and reaction in an engine at every so many of its steps (s), reactions from its accelerations."""
+        """Motion and reaction of the mechanism in an engine, at every ``stride``-th step (s). The reaction follows from
+        the engine's accelerations by Newton's and Euler's equations."""
         model = free_model(engine, self.driven(), Settings("RK44", step, duration))
         rates = self.start_rates()
         states = model.march(0.0 * rates, rates, round(duration / step), step)[::stride]
@@ -108,7 +109,8 @@ class JointTree:
 
 
 def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
-    """The chain whose hinges stay apart on a path; Refused where none does."""
+    """The joint chain whose hinges stay farthest from a singularity along a path; raises Refused where every chain
+    comes too near."""
     trees = [JointTree(mechanism, axes) for axes in _layouts(mechanism)]
     apart = [_least_hinge_cosine(tree, path) for tree in trees]
     best = int(np.argmax(apart))
@@ -118,7 +120,7 @@ def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
 
 
 def _layouts(m: Mechanism) -> list[np.ndarray]:
-    """Axes that the vehicle may have."""
+    """Candidate axes (3, 3) for the chain of joints, as columns."""
     if m.kind in ("revolute", "prismatic", "cylindrical"):
         return [m.ground.axes]
     if m.kind == "universal":
@@ -137,7 +139,8 @@ def _layouts(m: Mechanism) -> list[np.ndarray]:
 
 
 def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
-    """Least cosine of the second hinge of a ball or a rod on a path; 1 where there is none."""
+    """Least cosine of the angle of a ball's or a rod's second hinge along a path: 0 at its singularity, 1 where the
+    mechanism has no such hinge."""
     if tree.mechanism.kind not in ("spherical", "free", "distance"):
         return 1.0
     turned = tree.axes.T @ path.turned @ tree.axes
@@ -154,8 +157,8 @@ def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
 
 
 def _walked(vehicle: SpatialVehicle, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Place, velocity, acceleration (m, 3), rotation (m, 3, 3), angular velocity and acceleration (m, 3) of the last
-    body of a chain, in the vehicle's axes, by relative motion from joint to joint."""
+    """Motion of the last body of a chain in the vehicle's axes: position, velocity, acceleration (m, 3), rotation (m,
+    3, 3), angular velocity and angular acceleration (m, 3). It is computed by relative motion from joint to joint."""
     count = len(q)
     x, w, alpha = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     speed, gain, turned = np.zeros((count, 3)), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))

@@ -33,7 +33,8 @@ NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """part : number of its part. place (3,): m. axes (3, 3): its axes as columns."""
+    """A coordinate frame on a part. part : number of the part; place (3,) : position in m; axes (3, 3) : axes as
+    columns."""
 
     part: int
     place: np.ndarray
@@ -80,12 +81,12 @@ class Mechanism:
     on_body: bool = False
 
     def with_spring(self, **values: float) -> "Mechanism":
-        """The same with other values of its only spring."""
+        """The mechanism with other values of its only spring."""
         (spring,) = self.springs
         return replace(self, springs=(replace(spring, **values),))  # type: ignore[arg-type]
 
     def moved(self, shift: np.ndarray) -> "Mechanism":
-        """The same with the body, its end of the joint and its ends of springs moved at the start (m)."""
+        """The mechanism with the body shifted (m) at the start, together with its joint point and spring ends."""
         return replace(
             self,
             centre=self.centre + shift,
@@ -130,7 +131,7 @@ class _Reading:
         return self.markers[number]
 
     def pair(self, statement: Statement, first: int, second: int) -> tuple[Marker, Marker]:
-        """The ground's marker and the body's of two."""
+        """Of two markers, the one on the ground and the one on the body, in this order."""
         both = self.marker(statement, first), self.marker(statement, second)
         if {marker.part for marker in both} != {self.ground.number, self.part.number}:
             raise statement.refuse("", [first, second], "must be a marker of the ground and one of the body")
@@ -216,7 +217,8 @@ class _Reading:
         return stiffness, damping, rest
 
     def _function(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
-        """Stiffness, damping and rest of a force that is affine in travel and rate, read off its values."""
+        """Stiffness, damping and free length (or angle) of a spring force, which must be linear in travel and rate.
+        They are found by evaluating its expression."""
         text = statement.text("FUNCTION").lower().replace("\\", " ")
         i, j = (f"0*{statement.whole(end)}" for end in "IJ")
         travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
@@ -237,7 +239,7 @@ class _Reading:
 
 
 def _evaluated(statement: Statement, text: str) -> Callable[[float, float], float]:
-    """Value of an expression of numbers, travel, rate, RTOD and DTOR."""
+    """Value of an expression as a function of travel and rate; it may contain numbers, RTOD and DTOR."""
     names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
     try:
         tree = ast.parse(text.strip(), mode="eval")
@@ -263,7 +265,8 @@ def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _cross(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
-    """Markers whose z axes are the arms of the cross: x of the I marker, y of the J marker."""
+    """Both markers of a universal joint, turned so that their z axes are the arms of the cross: the x axis of the I
+    marker, and the y axis of the J marker."""
     of_ground, of_body = (0, 1) if ground_first else (1, 0)
     return replace(ground, axes=np.roll(ground.axes, 2 - of_ground, 1)), replace(
         body, axes=np.roll(body.axes, 2 - of_body, 1)

@@ -33,7 +33,8 @@ _KEY = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement: file, line where it begins, name, number (0 if it has none), values by key, flags as empty."""
+    """One statement of a model file: file name, first line, name, number (0 if it has none), and values by key. A flag
+    is a key without values."""
 
     file: str
     line: int
@@ -42,22 +43,23 @@ class Statement:
     values: dict[str, list[str]]
 
     def refuse(self, what: str, value: object, allowed: str) -> InputError:
-        """The error about a part of this statement."""
+        """InputError about a key or value of this statement."""
         return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{what}", value, allowed)
 
     def has(self, key: str) -> bool:
-        """Whether a key or a flag is there."""
+        """Whether the statement has this key or flag."""
         return key in self.values
 
     def whole(self, key: str) -> int:
-        """The number of a marker or a part; InputError where it is missing."""
+        """The number of a marker or part that a key refers to; InputError where it is missing."""
         text = self.values.get(key, [""])[0]
         if not text.isdigit():
             raise self.refuse(f", {key}", text or None, "must be the number of a statement")
         return int(text)
 
     def numbers(self, key: str, default: tuple[float, ...]) -> np.ndarray:
-        """Values of a key, angles in rad, as many as the default, of which those that are left out are taken."""
+        """Values of a key, angles in rad. Those that the file omits are taken from the default, which also sets their
+        number."""
         given = [self._number(key, text) for text in self.values.get(key, [])]
         if len(given) > len(default):
             raise self.refuse(f", {key}", len(given), f"values found, at most {len(default)} have a meaning")
@@ -79,7 +81,7 @@ class Statement:
 
 
 def read_statements(path: str | Path) -> list[Statement]:
-    """All statements of a file that change its motion; InputError for what is not supported, by name and line."""
+    """All statements of a file that affect its motion; raises InputError with name and line for unsupported ones."""
     try:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

@@ -9,8 +9,8 @@ from validation.adams_joints.mechanism import Mechanism
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """times (m,) s; place, velocity, acceleration (m, 3) of the centre; turned (m, 3, 3): rotation since the start;
-    turning, spin_up (m, 3): angular velocity and acceleration, rad/s and rad/s^2."""
+    """Motion of a body. times (m,) s; place, velocity, acceleration (m, 3) of its centre; turned (m, 3, 3): rotation
+    since the start; turning, spin_up (m, 3): angular velocity (rad/s) and angular acceleration (rad/s^2)."""
 
     times: np.ndarray
     place: np.ndarray
@@ -23,15 +23,15 @@ class BodyMotion:
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """force (m, 3) N and moment (m, 3) N m that joint and springs together give to the ground (or, where the first
-    marker of the joint is the body's, to the body), about that marker."""
+    """Sum of the forces of joint and springs: force (m, 3) in N and moment (m, 3) in N m about a marker. They act on
+    the ground and are about its marker; where the joint's first marker is the body's, they act on the body."""
 
     force: np.ndarray
     moment: np.ndarray
 
 
 def reaction_by_momentum(mechanism: Mechanism, motion: BodyMotion) -> Reaction:
-    """Joint and springs by Newton's and Euler's equations: what the body's accelerations ask for beside its weight."""
+    """Reaction of joint and springs by Newton's and Euler's equations, from the body's accelerations and weight."""
     inertia = motion.turned @ mechanism.inertia @ np.transpose(motion.turned, (0, 2, 1))
     force = mechanism.mass * (motion.acceleration - mechanism.gravity)
     momentum = np.einsum("mij,mj->mi", inertia, motion.turning)
@@ -40,7 +40,7 @@ def reaction_by_momentum(mechanism: Mechanism, motion: BodyMotion) -> Reaction:
 
 
 def about_marker(mechanism: Mechanism, motion: BodyMotion, force: np.ndarray, moment: np.ndarray) -> Reaction:
-    """The reaction by force and moment (m, 3) on the body about its centre."""
+    """The reaction about its marker, from the force and moment (m, 3) that act on the body about its centre."""
     if mechanism.on_body:
         arm = np.einsum("mij,j->mi", motion.turned, mechanism.centre - mechanism.body.place)
         return Reaction(force, moment + np.cross(arm, force))
@@ -48,5 +48,5 @@ def about_marker(mechanism: Mechanism, motion: BodyMotion, force: np.ndarray, mo
 
 
 def marker_axes(mechanism: Mechanism, motion: BodyMotion) -> np.ndarray:
-    """Axes (m, 3, 3) of the centre's marker."""
+    """Axes (m, 3, 3) of the marker at the body's centre, as columns, over time."""
     return motion.turned @ mechanism.axes

@@ -18,26 +18,28 @@ CONTENT = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, "Rforc
 
 @dataclass(frozen=True, eq=False)
 class OutputFile:
-    """times (m,) s; columns by group (m, 3 or 4), as CONTENT; digits : significant ones of the file's numbers."""
+    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in CONTENT; digits: number of
+    significant digits in the file."""
 
     times: np.ndarray
     columns: dict[str, np.ndarray]
     digits: int
 
     def rounding(self, group: str) -> np.ndarray:
-        """Half of the last digit (m, columns) of a group's numbers."""
+        """Rounding error (m, columns) of a group's numbers: half of their last digit."""
         size = np.maximum(np.abs(self.columns[group]), 1e-30)
         return 0.5 * 10.0 ** (np.floor(np.log10(size)) - self.digits + 1)
 
     def motion(self, mechanism: Mechanism) -> BodyMotion:
-        """The file's motion."""
+        """The body's motion as the file gives it."""
         scalar, *vector = self.columns["Quat"].T
         turned = Rotation.from_quat(np.column_stack([*vector, scalar])).as_matrix() @ mechanism.axes.T
         c = self.columns
         return BodyMotion(self.times, c["Pos"], c["Vel"], c["Acc"], turned, c["Avel"], c["Aacc"])
 
     def energies(self, mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-        """Kinetic energy, and its sum with the potential one (m,), J."""
+        """Kinetic energy and total energy (m,) in J. The total is the sum of the kinetic and the gravitational
+        energy."""
         motion = self.motion(mechanism)
         inertia = motion.turned @ mechanism.inertia @ np.transpose(motion.turned, (0, 2, 1))
         kinetic = 0.5 * mechanism.mass * (motion.velocity**2).sum(axis=1)
@@ -45,16 +47,16 @@ class OutputFile:
         return kinetic, kinetic - mechanism.mass * motion.place @ mechanism.gravity
 
     def energy_lost(self, mechanism: Mechanism) -> float:
-        """Largest change of the whole energy by the largest kinetic one; 0 for a body at rest."""
+        """Ratio of the largest change of total energy to the largest kinetic energy; 0 for a body at rest."""
         kinetic, whole = self.energies(mechanism)
         return float(np.abs(whole - whole[0]).max() / max(kinetic.max(), 1e-30))
 
     def reaction(self) -> Reaction:
-        """The file's reaction."""
+        """The reaction force and moment that the file gives."""
         return Reaction(self.columns["Rforce"], self.columns["Rtorque"])
 
     def reaction_of_motion(self, mechanism: Mechanism) -> Reaction:
-        """What Newton's and Euler's equations ask for on the file's own motion."""
+        """Reaction by Newton's and Euler's equations from the file's own motion."""
         return reaction_by_momentum(mechanism, self.motion(mechanism))
 
 
@@ -85,5 +87,5 @@ def _digits(cell: str) -> int:
 
 
 def starts_with_mechanism(mechanism: Mechanism, output: OutputFile) -> bool:
-    """Whether the file begins where the mechanism does."""
+    """Whether the body's position in the file's first row is that of the mechanism at its start."""
     return bool(np.abs(output.columns["Pos"][0] - mechanism.centre).max() <= 1e-5)

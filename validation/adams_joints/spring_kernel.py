@@ -24,7 +24,8 @@ _NONE = (0.0, 0.0, 0.0)
 
 
 def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
-    """The table of springs whose points lie in the vehicle's axes; one that turns does so with the last coordinate."""
+    """Numbers of the springs and of the chain of joints, as one array for ``spring_forces``. The springs' points are in
+    the vehicle's axes; a torsion spring acts on the last coordinate."""
     chain = joints(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
@@ -68,7 +69,8 @@ def spring_forces(numbers, t, q, v, f):
 
 @compiled
 def set_spring_forces(block, t, n):
-    """``spring_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    """Call ``spring_forces`` on one block of doubles at an address: f, q and v (n,), then the table. f is set to zero
+    first."""
     f = at(block)
     array(f, (n,))[:] = 0.0
     spring_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

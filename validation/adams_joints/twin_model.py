@@ -43,7 +43,7 @@ def _row(numbers: np.ndarray) -> str:
 
 
 def _joints(m: Mechanism, laws: list[Spring]) -> str:
-    """Joints of the body in the order in which they turn it; Refused where MJCF has none."""
+    """MJCF text of the body's joints, in the order in which they act; Refused where MJCF has no such joint."""
     first, second = m.ground.axes[:, 2], m.body.axes[:, 2]
     kinds = {
         "revolute": [(HINGE, first)],
@@ -71,8 +71,9 @@ def _tendon(i: int, spring: Spring) -> str:
 
 
 def examined(mechanism: Mechanism, folder: Path, steps: int, step: float) -> tuple[float, dict[str, np.ndarray]]:
-    """Largest relative difference of accelerations of all builds from the file, and places (steps + 1, 3) of the centre
-    on the paths of the file's own model in MuJoCo and of Exudyn's build, by steps of so many seconds from its start."""
+    """Largest relative difference between the accelerations of all builds and those of the file. Paths (steps + 1, 3)
+    of the centre: by the file's own model in MuJoCo and by Exudyn's build, with steps of ``step`` (s) from the start.
+    """
     path = folder / "joint.xml"
     path.write_text(as_mjcf(mechanism), encoding="utf-8")
     twin = read(path).twin
@@ -85,7 +86,7 @@ def examined(mechanism: Mechanism, folder: Path, steps: int, step: float) -> tup
 
 
 def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
-    """Rates (n,) of the joints at the start, where angles that have no limit are those of the body's own axes."""
+    """Joint rates (n,) at the start that give the body its initial velocity and angular velocity."""
     data, size = mujoco.MjData(twin.model), twin.size
     mujoco.mj_forward(twin.model, data)
     moved, turned = np.empty((2, 3, size))
@@ -96,7 +97,7 @@ def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
 
 
 def _centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
-    """(m, 3): places of the body's centre at MuJoCo's positions (m, nq)."""
+    """Positions (m, 3) of the body's centre at MuJoCo's coordinates (m, nq)."""
     data, places = mujoco.MjData(twin.model), np.empty((len(positions), 3))
     for place, data.qpos[:] in zip(places, positions, strict=True):
         mujoco.mj_kinematics(twin.model, data)

@@ -56,7 +56,7 @@ Progress = Callable[[str, float], None]
 
 
 class Job(NamedTuple):
-    """What a process runs: cases and tests, or scenes in engines."""
+    """A job for a worker process: cases and tests to run, or scenes to run in engines."""
 
     cases: list[str]
     tests: list[str]
@@ -64,18 +64,19 @@ class Job(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its only case or file of tests, or its only run."""
+        """Name of the job: its first case, test file, or run."""
         return (*self.cases, *self.tests, *(f"{scene} in {engine}" for scene, engine in self.runs))[0]
 
     @property
     def trace(self) -> str:
-        """Name of the file of its trace."""
+        """Name of the file for this job's trace."""
         return self.name.rpartition("/")[2].replace(".py", "").replace(".toml", "").replace(" ", "_") + ".jsonl"
 
 
 @dataclass(frozen=True)
 class Traced:
-    """Trace of cases and tests: the functions they ran, their time and how they ended, by name.
+    """Record of all cases and tests that ran without a fault: for each by name, the functions that it ran, its time,
+    and how it ended.
 
     functions : all names, by place; items : each with "numbers", the functions that gave numbers in it.
     """
@@ -85,11 +86,12 @@ class Traced:
 
     @cached_property
     def numbers(self) -> set[str]:
-        """Functions that gave a number anywhere."""
+        """Functions that returned or wrote a number in any case or test."""
         return {name for item in self.items.values() for name in item["numbers"]}
 
     def callers(self, function: str, judges: bool) -> list[str]:
-        """Judges, or all others, in which a function gave numbers, the quickest first."""
+        """Names of the judges (cases and tests with independent grounds), or of all others, in which a function gave
+        numbers; the quickest first."""
         names = (name for name, item in self.items.items() if function in item["numbers"])
         return sorted(
             (name for name in names if self.is_judge(name) == judges), key=lambda name: self.items[name]["seconds"]
@@ -103,13 +105,14 @@ class Traced:
 
     @cached_property
     def sound(self) -> frozenset[str]:
-        """Ids of rows and tests that fail without a fault."""
+        """Ids of rows and tests that fail already without a planted fault."""
         rows = (row["id"] for item in self.items.values() for row in item.get("rows", ()) if row["status"] == "failed")
         return frozenset((*rows, *(name for name, item in self.items.items() if item.get("failed"))))
 
 
 class Probes:
-    """Processes that do jobs (``probe``), as many as there are workers; ``folder`` keeps what they compile."""
+    """Pool of worker processes that run jobs (``validation.blind_spots.probe``). ``folder`` keeps their compiled
+    code."""
 
     def __init__(self, folder: Path, workers: int = WORKERS) -> None:
         self.workers = min(workers, os.cpu_count() or 1)
@@ -125,19 +128,21 @@ class Probes:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End the processes, which are all idle but after an error."""
+        """End the worker processes, which are all idle unless an error occurred."""
         while not self.idle.empty():
             self.idle.get().communicate()
         self._place.cleanup()
 
     def map(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        """Results of some work on each item, by as many threads as there are processes, as they end."""
+        """Apply ``work`` to each item in as many threads as there are worker processes; yields the results in the order
+        in which they are ready."""
         with ThreadPoolExecutor(self.workers) as pool:
             for future in as_completed([pool.submit(work, item) for item in items]):
                 yield future.result()
 
     def run(self, job: Job, out: Path, faults: dict[int, float], sound: Collection[str]) -> str:
-        """Run cases and tests with some faults, by place; returns how that ended."""
+        """Run the cases and tests of a job in a worker process, with ``faults`` planted (function's number: relative
+        error). Returns how the job ended."""
         out.write_text("")
         told: Told = {**job._asdict(), "out": str(out), "faults": faults, "sound": sorted(sound)}
         told |= {"patience": LOST, "budgets": BUDGETS} if faults else {"patience": PATIENCE, "budgets": [PATIENCE] * 2}
@@ -152,7 +157,8 @@ class Probes:
 
 @dataclass(frozen=True)
 class Asked:
-    """Who is asked about a function: the judges of a trace, or all others.
+    """Checks that are run on functions with planted faults: either the judges of a trace, or all its other cases and
+    tests.
 
     engines : that share a function of Python, by its name.
     """
@@ -163,7 +169,8 @@ class Asked:
     engines: Mapping[str, tuple[str, ...]]
 
     def line_of(self, function: str) -> Line:
-        """Spoil one function, run those asked in which it gives numbers, and tell what notices."""
+        """Plant a fault in one function, run the checks in which it gives numbers, and return the line that says which
+        of them notice the fault."""
         traced = self.traced
         callers, ended = traced.callers(function, self.judges), unspoiled(function, traced)
         if ended or not callers:
@@ -181,13 +188,14 @@ class Asked:
         return self.line(function, ended, len(callers), left, (noticed, failed, grounded))
 
     def line(self, function: str, ended: str, calling: int = 0, left: int = 0, noticed: Noticed = ("", "", "")) -> Line:
-        """A line of a function, of this commit; noticed : by what."""
+        """Table line of a function at the present commit; noticed: ids of the rows, tests and independent checks that
+        notice its fault."""
         commit = str(provenance("")["commit"])
         return Line(function, ended, calling, left, *noticed, commit, kind_of(function, self.engines))
 
 
 def audit(folder: Path, progress: Progress) -> list[Line]:
-    """Lines of all shared functions; those that ``folder`` holds already are not run again.
+    """Audit all shared functions and return a line for each; lines that ``folder`` has already are kept.
 
     Raises InputError where the folder belongs to other functions than the sources have now.
     """
@@ -208,7 +216,7 @@ def audit(folder: Path, progress: Progress) -> list[Line]:
 
 
 def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers: int = WORKERS) -> list[Line]:
-    """Lines of the shared functions whose ``module:name`` is like ``only``, by judges alone.
+    """Audit the shared functions whose ``module:name`` matches ``only``, by judges alone; returns their lines.
 
     by : what the names of the cases and test files that are asked are like; the fewer, the shorter the trace. Raises
     InputError where no function or judge is like that, or as ``audit`` does.
@@ -227,7 +235,7 @@ def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers
 
 
 def measured(path: Path, functions: list[str], asked: Asked, progress: Progress) -> dict[str, Line]:
-    """Lines of some functions, by name: as the file keeps them, or measured now, and then kept.
+    """Lines of the given functions, by name: read from the file if it has them, else measured now and added to it.
 
     The file has a line for each of them from the start on, which says that it is not audited until it is.
     """
@@ -242,7 +250,8 @@ def measured(path: Path, functions: list[str], asked: Asked, progress: Progress)
 
 
 def in_order(functions: list[str]) -> list[str]:
-    """Compiled laws, then all other compiled functions, then those of Python, laws before others."""
+    """Functions sorted for the audit: compiled ones before those in Python, and in each group physical laws before
+    others."""
     compiled = set(compiled_functions())
 
     def rank(function: str) -> tuple[bool, int]:
@@ -253,7 +262,7 @@ def in_order(functions: list[str]) -> list[str]:
 
 
 def summary(lines: list[Line], folder: Path) -> list[str]:
-    """Printed summary: counts, then each function that nothing independent notices."""
+    """Printed summary of an audit: counts, then each function whose fault no independent check notices."""
     text = [f"{len(lines)} functions, {sum(line.is_covered for line in lines)} noticed by something independent"]
     for kind, names in uncovered(lines, [line.function for line in lines]).items():
         text += [f"{kind}:", *(f"  {name}" for name in names)]
@@ -261,13 +270,14 @@ def summary(lines: list[Line], folder: Path) -> list[str]:
 
 
 def judged_cases() -> list[str]:
-    """Cases that judge values."""
+    """Names of the cases whose rows judge values."""
     systems = {name: getattr(import_module(f"validation.cases.{name}"), "SYSTEM", "") for name in CASES}
     return [name for name, system in systems.items() if system not in UNJUDGED]
 
 
 def prepare(folder: Path, only: str = "*") -> list[str]:
-    """The functions whose ``module:name`` is like ``only``, kept in the folder; no others are rewritten.
+    """Functions whose ``module:name`` matches ``only``. They are saved in the folder, since the worker processes can
+    plant faults in these functions alone.
 
     Raises InputError where there are none, or where the folder holds others.
     """
@@ -282,28 +292,29 @@ def prepare(folder: Path, only: str = "*") -> list[str]:
 
 
 def jobs(with_grounds: bool) -> list[Job]:
-    """Jobs of the trace, each in a process of its own: cases, and files of tests that name independent grounds, or
-    those too that name none."""
+    """Jobs of the trace, each in a process of its own: cases, and test files that name independent grounds; or also
+    test files that name none."""
     files = sorted((ROOT / "tests").glob("test_*.py"))
     chosen = [str(each.relative_to(ROOT)) for each in files if not with_grounds or "mark.grounds(" in each.read_text()]
     return [Job([name], []) for name in judged_cases()] + [Job([], [file]) for file in chosen]
 
 
 def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
-    """The trace of cases and tests, read from the folder, or made now."""
+    """Trace of cases and tests: read from the folder where it is there, else made now."""
     lines = traced_lines(probes, functions, jobs, progress)
     return Traced(functions, {line.get("case") or line["test"]: line for line in lines})
 
 
 def trace_of_sides(probes: Probes, functions: list[str], progress: Progress) -> dict[str, tuple[str, ...]]:
-    """Engines that share a function of Python, by its name; nothing is run where all functions are compiled."""
+    """Engines that share each Python function, by its name. Nothing is run where all functions are compiled."""
     if {*functions} <= {*compiled_functions()}:
         return {}
     return sides(traced_lines(probes, functions, [Job([], [], [run]) for run in runs()], progress))
 
 
 def traced_lines(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> list[Told]:
-    """Lines of what some jobs ran, with functions by name: of their traces in the folder, which are made if missing."""
+    """Trace lines of jobs, with the names of the functions that they ran. Traces are read from the folder, and made
+    where they are missing."""
 
     def run_once(job: Job) -> Path:
         path = probes.folder / TRACE / job.trace
@@ -330,7 +341,7 @@ def lines_of(path: Path) -> list[Told]:
 
 
 def environment(folder: Path, doubles: Path) -> dict[str, str]:
-    """Variables of a process whose functions can be spoiled: machine code and bytecode stay in the audit's folder."""
+    """Environment variables for a worker process. They keep its machine code and bytecode in the audit's folder."""
     place = folder.absolute()
     order = {"functions": str(place / FUNCTIONS), "bytecode": str(place / "bytecode"), "memory": str(doubles)}
     return {
@@ -342,7 +353,7 @@ def environment(folder: Path, doubles: Path) -> dict[str, str]:
 
 
 def unspoiled(function: str, traced: Traced) -> str:
-    """Why a function cannot be 1 % off, as ``Line.ended`` tells it; "" where it can."""
+    """Reason why no 1 % fault can be planted in a function, in the words of ``Line.ended``; "" where it can."""
     if not can_be_spoiled(*function.split(":")):
         return "not spoiled"
     if function in traced.numbers:
@@ -351,7 +362,7 @@ def unspoiled(function: str, traced: Traced) -> str:
 
 
 def _rows(told: list[Told]) -> Iterator[tuple[str, str]]:
-    """Rows that failed: id and grounds."""
+    """Failed rows of the log: id and grounds of each."""
     for line in told:
         for row in line.get("rows", ()):
             if row["status"] == "failed":
@@ -359,5 +370,5 @@ def _rows(told: list[Told]) -> Iterator[tuple[str, str]]:
 
 
 def _tests(told: list[Told]) -> Iterator[tuple[str, str]]:
-    """Tests that failed: id and grounds."""
+    """Failed tests of the log: id and grounds of each."""
     return ((line["test"], line["grounds"]) for line in told if line.get("failed"))

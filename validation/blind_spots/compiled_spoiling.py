@@ -17,7 +17,8 @@ llvmlite.binding.add_symbol(SYMBOL, ADDRESS)
 
 
 def _pointer(builder: Any, row: int, place: Any) -> Any:
-    """Where the number of a function stands in a row of ``memory``."""
+    """Address of a function's entry in a row of ``memory`` (faults, functions that ran, functions that gave
+    numbers)."""
     double = ir.DoubleType()
     rows = builder.module.globals.get(SYMBOL)
     rows = rows or ir.GlobalVariable(builder.module, ir.ArrayType(double, 3 * PLACES), SYMBOL)
@@ -27,7 +28,7 @@ def _pointer(builder: Any, row: int, place: Any) -> Any:
 
 @_intrinsic
 def ran(typingctx: Any, place: Any) -> Any:
-    """Mark a function that gives no number that could be off."""
+    """Compiled marker: record that a function ran which returns no number."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.store(ir.DoubleType()(1.0), _pointer(builder, 1, arguments[0]))
@@ -38,7 +39,8 @@ def ran(typingctx: Any, place: Any) -> Any:
 
 @_intrinsic
 def factor(typingctx: Any, place: Any) -> Any:
-    """Mark a function that gives a number; what the number is multiplied by."""
+    """Compiled marker: record that a function ran and gave a number. Returns the factor of its planted fault, 1 without
+    a fault."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         double = ir.DoubleType()
@@ -61,7 +63,8 @@ def _product(value, place):
 
 
 def _product_if_off(value, place):
-    """The array itself without a fault, as whoever gets it may write into it."""
+    """The value times the fault's factor. Without a fault it is the same array, because the caller may write into
+    it."""
     by = factor(place)
     return value if by == 1.0 else value * by
 
@@ -72,7 +75,8 @@ def _is_number(kind: Any) -> bool:
 
 @overload(spoiled)
 def _spoiled(value, place):
-    """An array stays where the function may not make one (``lean``)."""
+    """Choose the compiled function that plants the fault in a value of this type. An array stays unchanged where the
+    compiled function may not allocate another one (``lean``)."""
     if _is_number(value):
         return _product
     if isinstance(value, types.BaseTuple) and any(_is_number(part) or _makes_arrays(part) for part in _parts(value)):
@@ -81,19 +85,19 @@ def _spoiled(value, place):
 
 
 def _parts(kind: Any) -> list[Any]:
-    """Types of what a tuple holds, and of what tuples in it hold."""
+    """Types of all elements of a tuple type, those of nested tuples included."""
     return [inner for part in kind for inner in (_parts(part) if isinstance(part, types.BaseTuple) else [part])]
 
 
 def _makes_arrays(kind: Any) -> bool:
-    """Whether this is an array of numbers, and the function that is compiled may make another."""
+    """Whether the type is an array of numbers, and the function being compiled may allocate arrays."""
     flags = ConfigStack.top_or_none()
     is_array = isinstance(kind, types.Array) and _is_number(kind.dtype)
     return is_array and flags is not None and bool(flags.nrt)
 
 
 def _tuple(kind: Any) -> Any:
-    """A compiled function that spoils each part of a tuple of this kind."""
+    """A compiled function that plants the fault in each element of a tuple of this type."""
     parts = ", ".join(f"spoiled(value[{i}], place)" for i in range(len(kind)))
     made = f"cls({parts})" if isinstance(kind, types.BaseNamedTuple) else f"({parts},)"
     names = {"spoiled": spoiled, "cls": getattr(kind, "instance_class", tuple)}
@@ -120,7 +124,7 @@ def _scaled(values, place):
 
 
 def _records(kind: types.Record) -> Any:
-    """A compiled function that puts the numbers of an array of such records off."""
+    """A compiled function that multiplies all fields of an array of such records by the fault's factor."""
     lines = "".join(f"            record.{name} = by * record.{name}\n" for name in kind.fields)
     names = {"np": np, "factor": factor}
     loop = "        for each in np.ndindex(values.shape):\n            record = values[each]\n"

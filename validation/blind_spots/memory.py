@@ -22,13 +22,15 @@ SYMBOL = "twinrig_blind_spots"
 
 
 def order() -> dict[str, str]:
-    """The audit's order to this process, from the environment; empty in a process that belongs to no audit."""
+    """The audit's instructions for this process, from the environment; empty in a process that is not part of an
+    audit."""
     told: dict[str, str] = json.loads(os.environ.get(VARIABLE, "{}"))
     return told
 
 
 def rows(path: Path | None) -> list[ctypes.Array[ctypes.c_double]]:
-    """The three rows of a file as processes share them, or of memory that no other has; all zero where they are new."""
+    """Three rows of numbers: faults, functions that ran, functions that gave numbers. They lie in a file that processes
+    share, or in private memory without a path; a new file holds zeros."""
     if path is None:
         memory = mmap.mmap(-1, BYTES)
     else:
@@ -45,16 +47,16 @@ ADDRESS = ctypes.addressof(FAULTS)
 
 
 def places(marks: ctypes.Array[ctypes.c_double]) -> list[int]:
-    """Functions that are marked."""
+    """Numbers of the functions whose entry is not zero."""
     return [place for place, mark in enumerate(marks) if mark]
 
 
 def clear(row: ctypes.Array[ctypes.c_double]) -> None:
-    """Take the faults or the marks of all functions away."""
+    """Set a row to zero: the faults, or the marks of all functions."""
     ctypes.memset(row, 0, ctypes.sizeof(Row))
 
 
 def forget() -> None:
-    """Take the marks of all functions away; faults stay."""
+    """Set the marks of all functions to zero; planted faults stay."""
     clear(RAN)
     clear(NUMBERS)

@@ -15,13 +15,13 @@ from validation.blind_spots.memory import order
 
 
 def start() -> None:
-    """Do what the environment says; nothing without it."""
+    """Install the import hook that plants faults, if the environment asks for it."""
     if order():
         sys.meta_path.insert(0, Planter(json.loads(Path(order()["functions"]).read_text())))
 
 
 class Planter:
-    """Finds the modules of some functions first, and rewrites them as they are imported.
+    """Import hook for modules with given functions: it rewrites these functions as their module is imported.
 
     functions : ``module:name`` of each; its place in this list is the place of its factor.
     """
@@ -33,7 +33,8 @@ class Planter:
             self.modules.setdefault(module, {})[name] = place
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """The spec of such a module with a loader that rewrites it; None for any other."""
+        """Import specification, with a rewriting loader, of a module whose functions are to be rewritten; None for any
+        other module."""
         if fullname not in self.modules:
             return None
         spec = PathFinder.find_spec(fullname, path, target)
@@ -48,7 +49,7 @@ class _Rewriting(SourceFileLoader):
         self.names = names
 
     def get_code(self, fullname: str) -> Any:
-        """The rewritten module's code, kept apart from that of the module as it stands in the sources."""
+        """Code of the rewritten module. Its bytecode is cached apart from that of the original source."""
         earlier, sys.pycache_prefix = sys.pycache_prefix, order()["bytecode"]
         try:
             return super().get_code(fullname)

@@ -33,29 +33,30 @@ IMPORT = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", r
 
 
 def clock() -> float:
-    """Seconds of the processor that this process and those that it has ended took."""
+    """Processor time (s) of this process and of its ended child processes."""
     return sum(os.times()[:4])
 
 
 class Compiling(event.Listener):
-    """Seconds of the processor that numba took."""
+    """Timer of the processor time (s) that numba's compilation takes."""
 
     def __init__(self) -> None:
         self.seconds, self.depth, self.start = 0.0, 0, 0.0
 
     def on_start(self, event: Any) -> None:
-        """numba begins, perhaps within another compilation."""
+        """numba starts to compile, perhaps within another compilation."""
         self.start = clock() if self.depth == 0 else self.start
         self.depth += 1
 
     def on_end(self, event: Any) -> None:
-        """numba has ended."""
+        """numba has finished a compilation."""
         self.depth -= 1
         self.seconds += clock() - self.start if self.depth == 0 else 0.0
 
 
 class Told:
-    """Adds what ended to the file, which functions it ran, and how long it took without compiling."""
+    """Log of a job: writes to its file how each case or test ended, the functions that it ran, and its time without
+    compilation."""
 
     def __init__(self, job: dict[str, Any]) -> None:
         self.out, self.sound, self.budgets = Path(job["out"]), set(job["sound"]), job["budgets"]
@@ -65,20 +66,20 @@ class Told:
         self.first = self.clock()
 
     def clock(self) -> float:
-        """Seconds so far, without those that numba's compiling took."""
+        """Processor time (s) so far without numba's compilations."""
         return clock() - self.compiling.seconds
 
     def is_enough(self) -> bool:
-        """Whether the budget is used."""
+        """Whether the job has used up its budget of processor time."""
         return self.clock() - self.first > self.budgets[0 if self.noticed else 1]
 
     def begin(self) -> None:
-        """A case or test begins."""
+        """Record that a case or test begins."""
         self.start, self.refused = self.clock(), False
         memory.forget()
 
     def end(self, line: dict[str, Any], failed: list[tuple[str, str]]) -> None:
-        """A case or test has ended; failed : ids and grounds."""
+        """Record that a case or test has ended; failed: ids and grounds of what failed."""
         self.noticed |= any(id not in self.sound and is_independent(id, grounds) for id, grounds in failed)
         line |= {"ran": memory.places(memory.RAN), "numbers": memory.places(memory.NUMBERS)}
         line |= {"seconds": self.clock() - self.start, "refused": self.refused}
@@ -87,7 +88,7 @@ class Told:
 
 
 def run_case(name: str, log: Told) -> None:
-    """Measure the quick share of a case; a case that breaks has one row, which failed."""
+    """Run the quick share of a case and log it; a case that raises an error counts as one failed row."""
     from validation.common.rows import rested
 
     log.begin()
@@ -106,7 +107,7 @@ def run_case(name: str, log: Told) -> None:
 
 
 def run_scene(scene: str, engine: str, log: Told) -> None:
-    """Run a scene in an engine; a run that is refused or fails shares nothing."""
+    """Run a scene in an engine and log it; functions of a refused or failed run do not count as shared."""
     from models.systems import run
 
     read = prepared(scene)
@@ -117,19 +118,20 @@ def run_scene(scene: str, engine: str, log: Told) -> None:
 
 
 def is_of_numba(error: BaseException) -> bool:
-    """Whether numba refuses a function: the fault is then the audit's, and no row has noticed anything."""
+    """Whether the error is numba's refusal to compile a function. The planted fault then caused it, and no row has
+    noticed anything."""
     return type(error).__module__.startswith("numba.")
 
 
 class Watching:
-    """Plug-in of pytest: tells how each test ended."""
+    """Plug-in for pytest that logs how each test ended."""
 
     def __init__(self, log: Told) -> None:
         self.told, self.failed = log, False
         self.session: pytest.Session | None = None
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
-        """Keep the session, which ends when the budget is used."""
+        """Keep pytest's session, which is stopped when the budget is used up."""
         self.session = session
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
@@ -138,7 +140,7 @@ class Watching:
         self.told.begin()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note the end of a part of a test."""
+        """Record whether the set-up, call or tear-down of a test failed."""
         self.failed |= report.failed
         if report.when == "teardown":
             marked = str(dict(report.user_properties).get("grounds", ""))
@@ -153,14 +155,15 @@ class Watching:
             self.told.refused |= is_of_numba(call.excinfo.value)
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
-        """Note what grounds a test names."""
+        """Record the independent grounds that a test names."""
         marker = item.get_closest_marker("grounds")
         if marker:
             item.user_properties.append(("grounds", marker.args[0]))
 
 
 def work(job: dict[str, Any]) -> None:
-    """Runs, which have a job of their own, or tests, which are quicker, and then cases."""
+    """Plant the faults of a job, then run its scenes or its tests, and then its cases as long as its budget lasts.
+    Scene runs form jobs of their own."""
     signal.setitimer(signal.ITIMER_PROF, job["patience"])
     for place, fault in job["faults"].items():
         memory.FAULTS[int(place)] = fault
@@ -175,18 +178,18 @@ def work(job: dict[str, Any]) -> None:
 
 
 def imported_by(tests: list[str]) -> list[str]:
-    """Modules that the files of some tests (as pytest is given them) import at their outermost level."""
+    """Modules that test files import at their top level; the tests are given as pytest's arguments."""
     files = dict.fromkeys(test.partition("::")[0] for test in tests)
     return list(dict.fromkeys(name for file in files for name in IMPORT.findall((ROOT / file).read_text("utf-8"))))
 
 
 def imported_by_runs(runs: list[Run]) -> list[str]:
-    """Modules that runs import: all of systems and engines; none without runs."""
+    """Modules to import before scenes are run: all systems and engines; none if the job has no runs."""
     return sorted(name for name in modules() if name.startswith(("models.systems.", "models.engines."))) if runs else []
 
 
 def ended(job: dict[str, Any]) -> str:
-    """Do a job in a fork; returns how it ended, as ``Line.ended`` tells it."""
+    """Run a job in a forked process; returns how it ended, in the words of ``Line.ended``."""
     memory.clear(memory.FAULTS)
     named = [f"validation.cases.{name}" for name in job["cases"]]
     for module in [*named, *imported_by(job["tests"]), *imported_by_runs(job["runs"])]:
@@ -203,7 +206,7 @@ def ended(job: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Do jobs until there are no more; what they print goes nowhere."""
+    """Run one job after the other until there are no more; their printed output is discarded."""
     answers = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_RDWR)
     os.dup2(nowhere, 1)

@@ -57,7 +57,7 @@ def function_of(parsed: ast.AST, name: str) -> Function:
 
 
 def _inside(node: ast.AST) -> Iterator[ast.AST]:
-    """Nodes of a block, without those in functions and classes inside it."""
+    """Nodes of a function's block, except those inside nested functions and classes."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, Function | ast.ClassDef | ast.Lambda):
@@ -71,7 +71,7 @@ def parameters(function: Function) -> list[str]:
 
 
 def roots(function: Function) -> dict[str, str]:
-    """Names that stand for an argument or a part of it, and that argument."""
+    """Names that refer to an argument of the function or to a view of it, each with the argument's name."""
     known = {name: name for name in parameters(function)}
     for node in _inside(function):
         if isinstance(node, ast.Assign):
@@ -91,7 +91,7 @@ def _pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
 
 
 def root_of(node: ast.expr, known: dict[str, str]) -> str:
-    """The argument that an expression is a part of; "" for none."""
+    """Name of the argument of which an expression is an element, attribute or view; "" for none."""
     while isinstance(node, ast.Subscript | ast.Attribute | ast.Call):
         if isinstance(node, ast.Call):
             inner = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
@@ -104,14 +104,14 @@ def root_of(node: ast.expr, known: dict[str, str]) -> str:
 
 
 def _stores(node: ast.AST, known: dict[str, str]) -> set[str]:
-    """Arguments that an assignment writes into."""
+    """Names of the arguments that an assignment writes into."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AugAssign) else []
     parts = [part for target in targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
     return {root_of(part, known) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)} - {""}
 
 
 def _imported(module: str, name: str) -> tuple[str, str] | None:
-    """Where a name that a module uses is defined: module and name; None outside of the project."""
+    """Module and name where a name used in a module is defined; None for names from outside the project."""
     for node in ast.walk(tree(module)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("models"):
             for each in node.names:
@@ -122,7 +122,7 @@ def _imported(module: str, name: str) -> tuple[str, str] | None:
 
 @cache
 def original(module: str, name: str) -> Function | None:
-    """The definition of a function as it stands in the sources; None where there is none."""
+    """Definition of a function in the unchanged sources; None if there is none."""
     try:
         return function_of(tree(module), name)
     except (NoSuchFunction, OSError):
@@ -131,8 +131,8 @@ def original(module: str, name: str) -> Function | None:
 
 @cache
 def written(module: str, name: str) -> frozenset[str]:
-    """Arguments that the functions which this one calls write into; none on the way back to a function that waits for
-    the answer, as functions do that call each other."""
+    """Arguments of a function that it passes to other functions which write into them. A function that is being
+    examined already, in a recursion, counts as writing nothing."""
     function = original(module, name)
     if function is None or (module, name) in _asked:
         return frozenset()
@@ -149,7 +149,8 @@ _asked: set[tuple[str, str]] = set()
 
 
 def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
-    """Arguments of the caller (module, name) that a call hands to a function which writes into them."""
+    """Names of the caller's arguments that a call passes to a function which writes into them; caller: module and
+    name."""
     place = _imported(caller[0], getattr(call.func, "id", ""))
     if place is None or place == caller:
         return set()
@@ -163,8 +164,8 @@ def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> se
 
 
 def arrays_behind(function: Function, known: dict[str, str], roots: set[str]) -> dict[str, list[ast.Call]]:
-    """Arrays that a function sees behind pointers, by argument: ``array(pointer, shape)`` of names that are given, or
-    set in its outermost statements."""
+    """Arrays that a function creates over pointers with ``array(pointer, shape)``, by the pointer's argument. Only
+    calls count whose names are arguments or occur in assignments at the function's top level."""
     outermost = {*parameters(function)}
     for statement in function.body:
         if isinstance(statement, ast.Assign):
@@ -180,8 +181,8 @@ def arrays_behind(function: Function, known: dict[str, str], roots: set[str]) ->
 
 
 class _Spoil(ast.NodeTransformer):
-    """Spoils what one function gives: caller, its module and name; last, arguments that are spoiled where it ends;
-    behind, see ``arrays_behind``, of those that are pointers."""
+    """Rewrites one function so that its results carry the fault. caller: its module and name; last: arguments that are
+    scaled when the function ends; behind: arrays over those of them that are pointers, see ``arrays_behind``."""
 
     def __init__(self, caller: tuple[str, str], function: Function, last: list[str], place: int) -> None:
         self.caller, self.known, self.last, self.place = caller, roots(function), last, place
@@ -191,7 +192,7 @@ class _Spoil(ast.NodeTransformer):
         }
 
     def body(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """The statements of the function."""
+        """The rewritten statements of the function's body."""
         made: list[ast.stmt] = []
         for statement in statements:
             new = self.visit(statement)
@@ -229,7 +230,8 @@ class _Spoil(ast.NodeTransformer):
         return self._put(node)
 
     def _put(self, node: Any) -> Any:
-        """The assignment with what it puts into an argument spoiled, unless that is spoiled as a whole."""
+        """Rewrite an assignment into an argument so that the assigned value carries the fault. If the whole argument is
+        scaled at the end, the value is only changed where the argument is no array."""
         into = sorted(_stores(node, self.known))
         if into and not set(into) & set(self.last):
             node.value = self._spoiled(node.value)
@@ -245,7 +247,7 @@ class _Spoil(ast.NodeTransformer):
         return self._call(PUT, value, ast.Name(argument, ast.Load()))
 
     def _endings(self) -> list[ast.stmt]:
-        """Statements that spoil arguments as a whole."""
+        """Statements at the function's end that scale whole arguments."""
         wholes = [whole for name in self.last for whole in self.behind.get(name, [ast.Name(name, ast.Load())])]
         return [ast.Expr(self._call(SCALED, whole)) for whole in wholes]
 
@@ -254,7 +256,8 @@ class _Spoil(ast.NodeTransformer):
 
 
 def rewritten(source: str, module: str, names: dict[str, int]) -> ast.Module:
-    """The module's tree with some functions spoiled, each by the fault at its place; raises NoSuchFunction."""
+    """Syntax tree of the module with some functions rewritten; names: the number of each function's fault. Raises
+    NoSuchFunction."""
     parsed = ast.parse(source)
     for name, place in names.items():
         function = function_of(parsed, name)
@@ -273,13 +276,13 @@ def _as_helper(name: str) -> ast.alias:
 
 
 def _stands_first(statement: ast.stmt) -> bool:
-    """Whether nothing may stand before a statement: a docstring, or what a module takes from the future."""
+    """Whether a statement must stay at the head of a module: the docstring or an import from ``__future__``."""
     is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
     return is_docstring or (isinstance(statement, ast.ImportFrom) and statement.module == "__future__")
 
 
 def can_be_spoiled(module: str, name: str) -> bool:
-    """Whether rewriting finds anything that a function gives back or writes."""
+    """Whether the function returns or writes a value into which a fault can be planted."""
     function = function_of(rewritten(text(module), module, {name: 0}), name)
     named = {
         node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)

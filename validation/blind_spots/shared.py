@@ -37,7 +37,7 @@ def modules() -> frozenset[str]:
 
 @cache
 def imports(module: str) -> frozenset[str]:
-    """Modules that one imports, anywhere in its text: those of ``models``, and engines."""
+    """Modules of ``models`` and engines that a module imports, anywhere in its source."""
     names = set[str]()
     for whole, package, inside, line in IMPORT.findall(text(module)):
         parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
@@ -46,7 +46,8 @@ def imports(module: str) -> frozenset[str]:
 
 
 def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
-    """Modules and all that they import, not going through some."""
+    """The modules in ``begin`` and all modules that they import, directly or not, without passing through those in
+    ``without``."""
     reached, left = set[str](), [name for name in begin if name not in without]
     while left:
         name = left.pop()
@@ -58,7 +59,7 @@ def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str
 
 @cache
 def shared_modules() -> tuple[str, ...]:
-    """Modules that more than one side shares, sorted."""
+    """Sorted names of the modules that more than one implementation (Exudyn, MuJoCo or the reference) uses."""
     of = [{name for name in modules() if engine in imports(name)} for engine in ENGINES]
     engines = frozenset[str]().union(*of)
     first, second = (side(names) for names in of)
@@ -107,6 +108,7 @@ def candidates() -> list[str]:
 
 
 def shared_functions(several: Collection[str]) -> list[str]:
-    """``module:name`` of all shared functions, compiled ones first; several : those that several engines call."""
+    """``module:name`` of all shared functions, compiled ones first; several : Python functions that several engines
+    call."""
     compiled = set(compiled_functions())
     return [name for name in candidates() if name in compiled or name in several]

@@ -25,12 +25,12 @@ Run = tuple[str, str]
 
 
 def scenes() -> dict[str, Path]:
-    """The scenes by the names of their files."""
+    """All scenes, by the names of their files."""
     return {path.name: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
 
 
 def runs() -> list[Run]:
-    """The runs that are traced: each scene in all engines of its system, where there are at least two."""
+    """The runs to trace: each scene in all engines of its system, if it has at least two."""
     engines = {name: engines_of(path) for name, path in scenes().items()}
     return [(name, engine) for name, several in engines.items() if len(several) > 1 for engine in several]
 
@@ -50,7 +50,7 @@ def prepared(scene: str) -> Any:
 
 
 def sides(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
-    """Engines that share a function, by its name, sorted; none where no scene has it run in two.
+    """Engines that share each function, sorted, by its name. Functions that no scene runs in two engines are left out.
 
     traced : of each run its "run", a ``Run``, and "numbers", the names of functions that gave numbers in it.
     """

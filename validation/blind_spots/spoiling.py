@@ -31,12 +31,12 @@ def numeric(value: Any) -> bool:
 
 
 def _is_labelled(value: Any) -> bool:
-    """Whether a value is an xarray.Dataset, which is imported where there is one."""
+    """Whether a value is an xarray.Dataset, tested without importing xarray."""
     return type(value).__name__ == "Dataset" and hasattr(value, "data_vars")
 
 
 def _ran(value: Any, place: int) -> float:
-    """Mark a function that gives or writes a value; its factor."""
+    """Record that a function gave a value; returns the factor of its planted fault, 1 without a fault."""
     RAN[place] = 1.0
     if not NUMBERS[place] and numeric(value):
         NUMBERS[place] = 1.0
@@ -44,25 +44,28 @@ def _ran(value: Any, place: int) -> float:
 
 
 def spoiled(value: Any, place: int) -> Any:
-    """The value of the function at a place: where that has a fault, a new value whose numbers are multiplied."""
+    """The value with the fault of a function's number: a copy whose numbers are multiplied, or the value itself without
+    a fault."""
     factor = _ran(value, place)
     return value if factor == 1.0 else _times(value, factor)
 
 
 def scaled(values: Any, place: int) -> None:
-    """Put the numbers of an array, or of its records, off in place; pointers and all else stay."""
+    """Multiply the numbers of an array, or of its records, in place by the fault's factor; pointers and other values
+    stay."""
     factor = _ran(values, place)
     if factor != 1.0:
         _scale(values, factor)
 
 
 def put(value: Any, into: Any, place: int) -> Any:
-    """``spoiled``, but the value itself where it goes into an array, which is ``scaled`` at the end."""
+    """``spoiled`` for a value that is assigned into an argument. A value that goes into an array stays, as the whole
+    array is ``scaled`` when the function ends."""
     return value if isinstance(into, np.ndarray) else spoiled(value, place)
 
 
 def _times(value: Any, factor: float) -> Any:
-    """A new value whose numbers are off; the value itself where it holds none."""
+    """Copy of a value with all its numbers multiplied by a factor; the value itself if it holds no numbers."""
     if isinstance(value, float | complex | np.floating | np.complexfloating):
         return type(value)(factor * value)  # type: ignore[arg-type]
     if isinstance(value, np.ndarray):
@@ -88,7 +91,7 @@ def _array(values: np.ndarray, factor: float) -> Any:
 
 
 def _dataclass(value: Any, factor: float) -> Any:
-    """A copy with fields that are off; nothing checks them again."""
+    """Copy of a dataclass with its fields multiplied; its validation is not run again."""
     made = copy.copy(value)
     for field in fields(value):
         old = getattr(value, field.name, None)

@@ -33,8 +33,8 @@ NOT_AUDITED = "not audited"
 
 @dataclass(frozen=True)
 class Line:
-    """Checks that notice a fault in a function: ids of rows and tests, which of them are independent, and what was not
-    run.
+    """Result for one function: the checks (ids of rows and tests) that notice its fault, which of these are
+    independent, and how many were not run.
 
     ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
     writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked), "not
@@ -56,7 +56,7 @@ class Line:
 
     @property
     def is_covered(self) -> bool:
-        """Whether something independent notices."""
+        """Whether an independent check notices the fault."""
         return bool(self.independent)
 
     @property
@@ -107,12 +107,12 @@ def harmless() -> dict[str, tuple[str, str]]:
 
 
 def kind_of(function: str, engines: Mapping[str, tuple[str, ...]]) -> str:
-    """Whether a function is compiled, or of Python and shared by which engines, as ``Line.kind`` tells it."""
+    """Kind of a function, in the words of ``Line.kind``: compiled, or in Python and shared by which engines."""
     return "compiled" if function in compiled_functions() else " ".join(["Python", *engines.get(function, ())])
 
 
 def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
-    """The measured lines, and the kept ones of all other functions that are still there.
+    """The newly measured lines, and the kept lines of all other functions that still exist.
 
     A function that was not audited now keeps its line.
     """
@@ -123,7 +123,7 @@ def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[s
 
 
 def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
-    """Functions that nothing independent notices, by what there is instead.
+    """Functions whose fault no independent check notices, grouped by the reason.
 
     functions : all that are shared now; those that have no line are "not audited" as well.
     """

@@ -14,7 +14,7 @@ from models.tyre.tyre_table import Tables, TyreTable, stacked
 
 
 def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: float = 10.0) -> OnRoad:
-    """A vehicle whose tyres are all alike, of a slope (1/rad)."""
+    """A vehicle whose wheels all have the same tyre, with a slip-angle slope (1/rad), on a road."""
     return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 
 
@@ -46,7 +46,7 @@ class RollingTruck:
 
     @property
     def turning(self) -> np.ndarray:
-        """Speeds of the wheels' turning (W,) in rad/s."""
+        """Angular velocities of the W wheels (W,) in rad/s."""
         return self.motion.turning
 
     @property
@@ -60,7 +60,8 @@ class RollingTruck:
         return float(np.hypot(*self.state[1, :2]))
 
     def on(self, torques: np.ndarray, step: float) -> tuple[int, float]:
-        """Go on by steps (s) between torques (n + 1, W) in N m; how it ended, and the time (s) that passed.
+        """Advance by steps (s) with brake torques (n + 1, W) in N m at their ends. Returns the status of the last step
+        and the time (s) that passed.
 
         torques (W,) : stay for one step.
         """
@@ -72,7 +73,8 @@ class RollingTruck:
     def braked(
         self, torques: np.ndarray, step: float = 5.5e-3, until: float = 0.0, duration: float = 200.0
     ) -> "RollingTruck":
-        """The state at the end of a stop, or earlier at a speed (m/s) or a time (s). Raises RunFailed."""
+        """Advance until the vehicle stands, or until it reaches a speed (m/s) or a time (s); returns the vehicle.
+        Raises RunFailed."""
         status = FINE
         while status == FINE and self.speed > until and self.time < duration - 1e-9:
             status, _ = self.on(torques, step)
@@ -88,12 +90,12 @@ LOCKS = 1e9
 
 
 def truck_on(tables: Tables | None = None, plane: Plane = PLANE) -> OnRoad:
-    """The truck on ice or on other tables, as steep as those of ice."""
+    """The truck on ice, or on other tyre tables with the slip-angle slope of those of ice."""
     return on_road(plane, tables or stacked([ICE]), slope=ICE.cornering)
 
 
 def constant(mu: float) -> Tables:
-    """Friction that is the same at every slip from 0.1 on."""
+    """Tyre table whose friction has the same value at every slip from 0.1 on."""
     flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
@@ -101,8 +103,7 @@ def constant(mu: float) -> Tables:
 
 
 def transfer_errors(mu: float = 0.4) -> dict[str, float]:
-    """Loads of the axles against their closed form, divided by those at rest, with all wheels locked, the front or the
-    rear.
+    """Relative errors of the axle loads against a closed form, with locked wheels: all, the front, or the rear ones.
 
     Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
     axles' loads change by m z g h / E.
@@ -123,6 +124,7 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
 
 
 def sideways_with_locked_front_wheels() -> float:
-    """Lateral way (m) of a truck on ice from 10 to 1 m/s whose front wheels are steered by 0.05 rad, but locked."""
+    """Lateral displacement (m) of a truck that slows from 10 to 1 m/s on ice with its front wheels steered by 0.05 rad
+    and locked."""
     locked = np.array([LOCKS, LOCKS, 0.0, 0.0])
     return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])

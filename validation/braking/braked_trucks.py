@@ -24,8 +24,8 @@ TRUCK, HIGH_TRUCKS = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}
 
 
 def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
-    """A case of the truck at rates of x, y (m/s) and heading (rad/s) under torques (N m) on ice: largest gain of its
-    kinetic energy over 20 ms, divided by that of the start."""
+    """Case: the truck slides on ice with rates of x, y (m/s) and heading (rad/s) under brake torques (N m). Error:
+    ratio of the largest gain of kinetic energy over 20 ms to the initial energy."""
 
     def energy(rates: np.ndarray) -> float:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
@@ -44,14 +44,16 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
 
 
 def on_even_friction(implementation: str, folder: Path) -> float:
-    """The truck on even friction, straight ahead: y, heading and yaw rate (m, rad, rad/s)."""
+    """Case: the truck brakes straight ahead on even friction. Error: y, heading and yaw rate (m, rad, rad/s), which
+    should be 0."""
     moved = MovedVehicle(implementation, TRUCK, DRY)
     moved.under(np.full((101, 4), 4e3))
     return float(np.abs(moved.state[:, 1:]).max())
 
 
 def mirrored(implementation: str, folder: Path) -> float:
-    """The truck steered left on a slick left side, and its mirror image: difference (m, rad)."""
+    """Case: the truck brakes and steers left, with less friction on the left. Error: difference (m, rad) from the
+    mirror image of the mirrored stop."""
     ends = []
     for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
         moved = MovedVehicle(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
@@ -73,7 +75,8 @@ def turned_over(implementation: str, folder: Path) -> float:
 
 
 def jackknifed(implementation: str, folder: Path) -> float:
-    """A train folded by 100 degrees, all wheels locked on dry road: largest gain of energy over 0.4 s, by the first."""
+    """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: ratio of the largest gain
+    of energy over 0.4 s to the initial energy."""
     plane = train(PAPER, CHOSEN.model_copy(update={"fold": np.pi}), transfer=False)
     moved = MovedVehicle(implementation, plane, DRY, turning=0.0)
     state = moved.state
@@ -93,7 +96,8 @@ def jackknifed(implementation: str, folder: Path) -> float:
 
 
 def no_friction_on_one_side(implementation: str, folder: Path) -> float:
-    """The truck locked, none on the left, 0.8 on the right, for 5 ms: speed lost against mu g t / 2, relative."""
+    """Case: all wheels of the truck are locked for 5 ms, with friction 0 on the left and 0.8 on the right. Error:
+    relative difference of the lost speed from mu g t / 2."""
     tyres, plane = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
     moved = MovedVehicle(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
     moved.under(np.full((6, 4), 2e4), 1e-3)
@@ -102,13 +106,14 @@ def no_friction_on_one_side(implementation: str, folder: Path) -> float:
 
 
 def braking_scene(**tables: Any) -> BrakingScene:
-    """The truck from 1.5 m/s on ice without anti-lock system."""
+    """Scene: the truck brakes from 1.5 m/s on ice without an anti-lock system."""
     plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
     return build({**plain, **tables})
 
 
 def lagging_at_rest(implementation: str, folder: Path) -> float:
-    """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
+    """Case: the truck stops from a slide on tyres with relaxation, then brakes on for 1 s. Error: distance and speed
+    (m, m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
     vehicle, begun = ready(scene, "stop")
     vehicle = marched_by(vehicle, implementation)
@@ -121,7 +126,8 @@ def lagging_at_rest(implementation: str, folder: Path) -> float:
 
 
 def rests(**tables: Any) -> Error:
-    """A case of a scene that must come to rest: speeds that are left of vehicle and wheels (m/s, rad/s)."""
+    """Case from a scene in which the vehicle must come to rest. Error: remaining speeds of vehicle and wheels (m/s,
+    rad/s)."""
 
     def error(implementation: str, folder: Path) -> float:
         path = run(braking_scene(**tables), implementation).detail
@@ -141,7 +147,8 @@ AT_THE_EDGE_OF_LOCKING: dict[str, Any] = {
 
 
 def one_wheel_lifted(implementation: str, folder: Path) -> float:
-    """Loads of which one would be negative: weight, and moments along and across, that change (N, N m)."""
+    """Case: wheel loads of which one is negative are shared out among the others. Error: change of their sum (N) and of
+    their moments (N m) about both axes."""
     loads = np.array([9e3, 24e3, -4e3, 26e3])
 
     def balance() -> np.ndarray:
@@ -153,12 +160,13 @@ def one_wheel_lifted(implementation: str, folder: Path) -> float:
 
 
 def below_push_out(implementation: str, folder: Path) -> float:
-    """Torque (N m) of a brake below its push-out pressure."""
+    """Brake torque (N m) below the push-out pressure; it should be 0."""
     return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
 
 
 def nonsense_answers(supply_pressure: float = 8.0, **command: Any) -> Error:
-    """A case of a controller that answers nonsense where the supply has ``supply_pressure`` bar."""
+    """Case: a controller returns an impossible command while the supply has ``supply_pressure`` bar; it must be
+    refused."""
 
     def error(implementation: str, folder: Path) -> float:
         checked_answer(

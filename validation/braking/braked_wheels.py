@@ -24,14 +24,15 @@ DRY, ICE = surface("dry"), surface("ice")
 
 
 def bent_friction(*points: tuple[float, float]) -> TyreTable:
-    """Friction of these (slip, mu) at every load and slip angle, and none across."""
+    """Tyre table with friction at given points (slip, mu), equal at every load and slip angle, and no lateral
+    friction."""
     slips, mu = np.array(points).T
     along = np.tile(mu, (2, 1, 1))
     return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)), np.zeros((2, 1)))
 
 
 class MovedVehicle(RollingTruck):
-    """A vehicle on tyres, moved on by an implementation; it begins by rolling."""
+    """A vehicle on tyres that starts with rolling wheels and is advanced by one of the implementations."""
 
     def __init__(
         self,
@@ -50,7 +51,8 @@ class MovedVehicle(RollingTruck):
             self.turning[:] = turning
 
     def under(self, torques: np.ndarray, step: float = STEP) -> bool:
-        """Go on under torques (n + 1, W) at the ends of steps (s); whether it came to rest. Raises RunFailed."""
+        """Advance with torques (n + 1, W) at the ends of steps (s); returns whether the vehicle came to rest. Raises
+        RunFailed."""
         self.motion.accelerations[:] = 0.0
         status, used = self.on(torques, step)
         if status in ENDS:
@@ -59,7 +61,7 @@ class MovedVehicle(RollingTruck):
 
     @property
     def rims(self) -> float:
-        """Speed of the first wheel's rim divided by that of the vehicle, less 1, as a magnitude."""
+        """Slip magnitude of the first wheel: |ratio of rim speed to vehicle speed - 1|."""
         return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
 
 
@@ -71,7 +73,7 @@ def stopping(
     turning: float | None = None,
     road: Road = UNIFORM_ROAD,
 ) -> float:
-    """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
+    """Stopping distance (m) under a constant torque (N m); infinite unless all speeds end at exactly 0."""
     wheel = MovedVehicle(implementation, QUARTER.plane, *tyres, turning=turning, road=road)
     least = min(level / QUARTER.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
     rests = wheel.under(np.full((int(2.0 * SPEED * QUARTER.mass / least / step) + 50, 1), level), step)
@@ -79,7 +81,8 @@ def stopping(
 
 
 def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
-    """Torque (N m) under which a slip stays, the way (m) that this takes, and the speed of turning (rad/s)."""
+    """Torque (N m) that holds the slip constant, the stopping distance (m) at this slip, and the wheel's initial
+    angular velocity (rad/s)."""
     force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return (
         QUARTER.steady_torque(slip, force),
@@ -89,13 +92,13 @@ def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
 
 
 def steady_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
-    """A case of a stop at a slip that stays: way against m v^2 / (2 F), relative."""
+    """Case: a stop at constant slip. Error: relative difference of the distance from m v^2 / (2 F)."""
     level, way, turning = settled_stop(tyre, slip)
     return lambda name, folder: abs(stopping(name, level, tyre, step=step, turning=turning) / way - 1.0)
 
 
 def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
-    """A case of a stop from rolling: way against the exact one, relative."""
+    """Case: a stop that starts with a rolling wheel. Error: relative difference of the distance from the exact one."""
     level, _, _ = settled_stop(tyre, slip)
     return lambda name, folder: abs(
         stopping(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
@@ -106,13 +109,15 @@ PEAKED = bent_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 
 def beyond_the_peak(implementation: str, folder: Path) -> float:
-    """A thousandth above the torque of the peak: the wheel locks; way against the exact one."""
+    """Case: a torque 0.1 % above that of the friction peak, so that the wheel locks. Error: relative difference of the
+    distance from the exact one."""
     peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
     return abs(stopping(implementation, peak, PEAKED) / exact_distance(QUARTER, PEAKED, peak, SPEED) - 1.0)
 
 
 def at_the_peak(implementation: str, folder: Path) -> float:
-    """The torque of the peak itself: way outside those of the peak and of sliding, by the first."""
+    """Case: exactly the torque of the friction peak. Error: relative amount by which the distance lies outside the
+    range from constant peak friction to constant sliding friction."""
     force = LOAD * 0.8
     way = stopping(implementation, QUARTER.steady_torque(0.1, force), PEAKED, turning=0.9 * SPEED / QUARTER.radius)
     least = QUARTER.mass * SPEED**2 / (2.0 * force)
@@ -120,20 +125,22 @@ def at_the_peak(implementation: str, folder: Path) -> float:
 
 
 def locked(implementation: str, folder: Path) -> float:
-    """Locked from the start: way against v^2 / (2 mu g)."""
+    """Case: the wheel is locked from the start. Error: relative difference of the distance from v^2 / (2 mu g)."""
     way = stopping(implementation, 2e4, DRY, turning=0.0)
     return abs(way * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
 
 
 def changing(implementation: str, folder: Path) -> float:
-    """Locked from friction 0.2 on to 0.8 after 10 m: way against its closed form."""
+    """Case: a locked wheel whose friction changes from 0.2 to 0.8 after 10 m. Error: relative difference of the
+    distance from its closed form."""
     slick, rough = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
     way = stopping(implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)]))
     return abs(way / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
 
 def frictions(implementation: str, folder: Path) -> float:
-    """Locked on friction from 1e-6 to 1.5 for 0.2 s: speed lost against mu g t."""
+    """Case: a locked wheel for 0.2 s, with friction from 1e-6 to 1.5. Error: difference of the lost speed from mu g
+    t."""
     errors = []
     for mu in (1e-6, 1e-3, 0.1, 1.5):
         wheel = MovedVehicle(implementation, QUARTER.plane, bent_friction((0.0, 0.0), (1.0, mu)), turning=0.0)
@@ -143,35 +150,38 @@ def frictions(implementation: str, folder: Path) -> float:
 
 
 def at_rest(implementation: str, folder: Path) -> float:
-    """A vehicle that stands, its brakes on: way and speed (m, m/s)."""
+    """Case: a vehicle that stands with its brakes on. Error: distance and speed (m, m/s), which should be 0."""
     wheel = MovedVehicle(implementation, QUARTER.plane, DRY, speed=0.0)
     wheel.under(np.full((51, 1), 5e3))
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
 def backwards(implementation: str, folder: Path) -> float:
-    """A wheel thrown backwards, no brake: rim's speed against the vehicle's after 0.5 s, by it."""
+    """Case: an unbraked wheel starts spinning backwards. Error: relative difference of rim speed and vehicle speed
+    after 0.5 s."""
     wheel = MovedVehicle(implementation, QUARTER.plane, DRY, turning=-10.0)
     wheel.under(np.zeros((101, 1)), 5e-3)
     return wheel.rims
 
 
 def released(implementation: str, folder: Path) -> float:
-    """A locked wheel whose brake lets go on a step's end: rim's speed against the vehicle's 0.6 s later, by it."""
+    """Case: the brake of a locked wheel is released at the end of a step. Error: relative difference of rim speed and
+    vehicle speed 0.6 s later."""
     wheel = MovedVehicle(implementation, QUARTER.plane, ICE, turning=0.0)
     wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
     return wheel.rims
 
 
 def on_the_line(implementation: str, folder: Path) -> float:
-    """A wheel exactly on the line between dry and ice: way against that on the left surface alone (m)."""
+    """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the distance
+    (m) from that on dry surface alone."""
     both = stopping(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
     return abs(both - stopping(implementation, 2e3, DRY))
 
 
 def slope_changes(implementation: str, folder: Path) -> float:
-    """Error on a change of friction, from dry on to wet within a step of 20 ms, lightly braked: way against that of the
-    same force, relative."""
+    """Case: a lightly braked wheel whose surface changes from dry to wet within a step of 20 ms. Error: relative
+    difference of the distance from that with the unchanged force."""
     level, way, turning = settled_stop(DRY, 0.004)
     both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
     stop = stopping(implementation, level, DRY, surface("wet"), step=2e-2, turning=turning, road=both)

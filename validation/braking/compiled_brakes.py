@@ -25,7 +25,7 @@ DRY = stacked([surface("dry")])
 
 
 def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
-    """(7,) as ``models.brake.plain.tyre.tyre``."""
+    """Compiled tyre step; its values (7,) are those of ``models.brake.plain.tyre.tyre``."""
     wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORTED, 1)), surfaces(1)
     below.first[0], below.second[0], below.share[0] = surface.first, surface.second, surface.share
     wheels.start[0], wheels.load[0] = motion.start, load
@@ -51,7 +51,8 @@ def friction(tables: Tables, table_index: int, angle: float, load: float, slip: 
 
 
 def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) -> np.ndarray:
-    """Tables and share of the second (4, 3) under the wheels of the truck at a state (2, 3), over a step (s)."""
+    """First table, second table and share of the second (4, 3) under the truck's wheels, for a state (2, 3) and a step
+    (s)."""
     below = surfaces(4)
     compiled_under_wheels(state, step, OnRoad(PLANE, kinds, 0.0, DRY, road), below)
     return np.column_stack((below.first, below.second, below.share))
@@ -60,7 +61,8 @@ def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) 
 def lag_on(
     state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, lag: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lags of the truck's tyres after a step, as by ``validation.braking.plain_relaxation.lag_on``."""
+    """Compiled counterpart of ``validation.braking.plain_relaxation.lag_on``: lagging slip angles of the truck's tyres
+    after a step."""
     after, lagging = lag.copy(), np.zeros(4)
     truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, UNIFORM_ROAD)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
@@ -68,12 +70,13 @@ def lag_on(
 
 
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
-    """A vehicle on its suspension in an engine, around the compiled forces; ``wheel_forces_in`` its table is what its
-    wheels hold."""
+    """A vehicle on its suspension in an engine that calls the compiled forces. ``wheel_forces_in`` of its table gives
+    access to the quantities held constant at its wheels."""
     return free_model(engine, driven(vehicle, engine))
 
 
 def wheel_forces_in(numbers: np.ndarray, wheels: int = 4) -> WheelForces:
-    """Constant quantities of so many wheels in a table of numbers: views, to read and to write."""
+    """Views into a table of numbers on the quantities that are constant at each wheel during a step; writing to them
+    changes the table."""
     rows = numbers[-wheels * HELD :].reshape(HELD, wheels)
     return WheelForces(rows[0], rows[1:3].T, rows[3])

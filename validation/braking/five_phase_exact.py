@@ -28,7 +28,8 @@ class ExactWheel:
 
 
 class Piece:
-    """Solution from slip s0 and torque (N m) that changes at a rate (N m/s), in cell i of the table."""
+    """Exact slip over time within cell i of the friction table. It starts at slip s0 with a torque (N m) that changes
+    at a constant rate (N m/s)."""
 
     def __init__(self, wheel: ExactWheel, i: int, s0: float, torque: float, rate: float) -> None:
         way = wheel.slips[i + 1] - wheel.slips[i]
@@ -55,7 +56,7 @@ class Piece:
         return -self.v * (self.b - self.k * (self.s0 - self.a) * math.exp(-self.k * t))
 
     def impulse(self, t: float) -> float:
-        """Integral of the tyre's force (N s)."""
+        """Time integral (N s) of the tyre's force up to a time t (s)."""
         if self.flat:
             area = self.s0 * t + self.alpha * t * t / 2.0 + self.beta * t**3 / 6.0
         else:
@@ -63,7 +64,7 @@ class Piece:
         return self.force[0] * t + self.force[1] * area
 
     def meets(self, level: float) -> float:
-        """Time at which r w' is at a level; infinite if never."""
+        """Time (s) at which the rim's acceleration r w' (m/s^2) reaches a level; infinite if it never does."""
         if self.flat:
             time = (-level / self.v - self.alpha) / self.beta if self.beta else math.inf
         else:
@@ -72,7 +73,8 @@ class Piece:
         return time if time > 0.0 else math.inf
 
     def leaves(self, low: float, high: float, until: float) -> tuple[float, int]:
-        """Time before ``until`` at which the slip meets the lower or the upper node, and which, -1 or 1; else 0."""
+        """First time before ``until`` at which the slip leaves its cell, and through which node: -1 lower, 1 upper.
+        Returns ``until`` and 0 if it stays."""
         turn = min(self.meets(0.0), until)
         for start, end in ((0.0, turn), (turn, until)):
             for node, side in ((low, -1), (high, 1)):
@@ -88,7 +90,8 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level: float) -> None:
-    """Move ``state`` (slip, torque, time, impulse) on to the end of a phase at a rate of torque (N m/s)."""
+    """Advance ``state`` (slip, torque, time, impulse) to the end of a phase in which the torque changes at a constant
+    rate (N m/s). The phase ends when the rim's acceleration reaches ``level``."""
     i = min(int(np.searchsorted(wheel.slips, state[0], side="right")) - 1, wheel.slips.size - 2)
     for _ in range(100_000):
         piece = Piece(wheel, i, state[0], state[1], rate)
@@ -106,7 +109,8 @@ def phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level
 
 
 def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
-    """``cycle`` of a wheel at a frozen speed whose brake is a line; begun : rate of pressure (bar/s) at first."""
+    """Period and mean force, as ``cycle`` gives them, of a wheel at constant vehicle speed whose brake torque is linear
+    in the pressure. begun: rate of pressure (bar/s) in the first application."""
     rates = [rate(k, controller) for k in range(6)]
     rates[0] = rates[0] if begun is None else begun
     phases = [(frozen.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
@@ -115,7 +119,7 @@ def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = Non
 
 
 def cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
-    """Period (s) and mean force by the largest, of the last of some cycles.
+    """Period (s) of the last of several control cycles, and ratio of its mean force to the largest tyre force.
 
     phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.
     """

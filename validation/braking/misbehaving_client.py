@@ -15,12 +15,12 @@ NAN = float("nan")
 
 
 def frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
-    """Bytes of a controller's answer, right or spoilt."""
+    """Bytes of a controller's answer, valid by default; arguments make it invalid."""
     return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def misbehave(kind: str, number: int, link: socket.socket) -> None:
-    """Do it, and wait until the other end has had enough."""
+    """Misbehave in the way ``kind``, then wait until the other end closes the connection."""
     if kind == "died":
         os._exit(9)
     if kind == "late":
@@ -45,7 +45,7 @@ def misbehave(kind: str, number: int, link: socket.socket) -> None:
 
 
 def main(kind: str, port: str) -> None:
-    """Answer, then do what ``kind`` says."""
+    """Answer correctly for some samples, then misbehave in the way ``kind``."""
     with socket.create_connection(("127.0.0.1", int(port))) as link:
         while True:
             asked = link.recv(104, socket.MSG_WAITALL)

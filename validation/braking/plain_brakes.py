@@ -40,14 +40,16 @@ def tables() -> Tables:
 
 
 def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
-    """Largest difference (m, ...) by the largest size of each column; infinite where one side is no number."""
+    """Largest difference between two arrays; in each column it is divided by the column's largest magnitude. Infinite
+    where only one of them is not a number."""
     scale = np.maximum(np.abs(plain).max(axis=0), 1e-300)
     apart = float(np.max(np.abs(compiled - plain) / scale))
     return apart if np.isfinite(apart) else np.inf
 
 
 def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Reports (count, 7) of wheels over a step, compiled and plain: rolling, locked, freed, thrown backwards."""
+    """Tyre reports (count, 7) for random steps, by compiled and by plain code; wheels roll, are locked, are released or
+    spin backwards."""
     random, tyre_tables = np.random.default_rng(seed), tables()
     reports, plain = np.empty((2, count, 7))
     for i in range(count):
@@ -68,7 +70,8 @@ def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.
 
 
 def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Tables and shares (4 count, 3) under wheels of a truck that passes seams and lines, compiled and plain."""
+    """Surface numbers and shares (4 count, 3) under the wheels of a truck that crosses seams and lines, by compiled and
+    by plain code."""
     random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
     stretched: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
     kind = np.array([0, 0, 1, 1])
@@ -82,7 +85,8 @@ def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndar
 
 
 def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Pressures, torques and supply (n, 9) along random commands of valves and of pressures, compiled and plain."""
+    """Pressures, torques and supply pressure (n, 9) under random valve and pressure commands, by compiled and by plain
+    code."""
     random, four = np.random.default_rng(seed), np.ones(4)
     brakes = of_wheels(
         Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1600.0),
@@ -117,7 +121,8 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
 
 
 def slip_lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """Lagging slips and what the step is given of them (count, 8), compiled and plain."""
+    """Lagging slip angles after a step, and those used within the step, (count, 8) for random states, by compiled and
+    by plain code."""
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
     lags, plain = np.empty((2, count, 8))
     for i in range(count):
@@ -132,8 +137,8 @@ def slip_lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.nda
 
 
 def frictions(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """mu_x and mu_y (count, 2): of stacked tables by compiled code, and of each table on
-    its nodes by plain code."""
+    """mu_x and mu_y (count, 2) of random states: compiled code on stacked tables, and plain code on each table with its
+    own nodes."""
     random, tyres = np.random.default_rng(seed), [surface("dry"), by_load("wet"), by_load("ice")]
     all_tables, (coefficients, plain) = stacked(tyres), np.empty((2, count, 2))
     for i in range(count):

@@ -25,7 +25,7 @@ def lag_on(
     length: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``models.brake.plain.relaxation.lag_on`` by a state (2, 3): x, y, heading and their rates.
+    """Call ``models.brake.plain.relaxation.lag_on`` for a state (2, 3): x, y, heading, and their rates.
 
     places (W, 2) : of the wheels (m); steer (W,) : rad; lag (W,) : the angles before.
     """
@@ -38,14 +38,14 @@ def lag_on(
 
 
 def rotation(angle: float) -> np.ndarray:
-    """(2, 2) turning by an angle (rad)."""
+    """Rotation matrix (2, 2) for an angle (rad)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
 
 def turn_apart(length: float, substeps: int = 4) -> float:
-    """Distance (m) by which a braked turn of the truck on tyres that relax over a length (m) ends from its written
-    equations."""
+    """Distance (m) between the final positions of a braked turn by the truck model and by its written-out equations.
+    The truck's tyres have a relaxation length (m)."""
     tyre, torques = surface("ice"), (300.0, 200.0)
     end = braked_turn(PAPER, tyre, STEER, torques, FIRST_SPEED, LAST_SPEED, length)
     path = on_tyres(

@@ -60,13 +60,13 @@ def towing() -> Sprung:
 
 @cache
 def in_row() -> Sprung:
-    """The twin with a trailer of a drawbar and a box, all of it without symmetry."""
+    """The twin with a trailer made of a drawbar and a box, all without symmetry."""
     return sprung(train(), SPIN)
 
 
 @cache
 def compiled_springs() -> Sprung:
-    """The twin with its trailer, all of whose springs are compiled forces."""
+    """The twin with its trailer, with all springs computed by the compiled force function."""
     return sprung(train(), SPIN, forces="compiled")
 
 
@@ -76,12 +76,13 @@ EVERY_VEHICLE = {**VEHICLES, **TRAINS}
 
 
 def wheels_of(vehicle: Sprung) -> int:
-    """How many wheels a vehicle has, with those of what it tows."""
+    """Number of wheels of a vehicle, those of its trailer included."""
     return len(vehicle.handling.vehicle.tyres)
 
 
 def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
-    """Random coordinates and rates (count, 2, size) at any heading, and what is held at their wheels."""
+    """Random coordinates and rates (count, 2, size) at any heading, and the random quantities held constant at their
+    wheels."""
     random = np.random.default_rng(SEED)
     both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
     both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
@@ -97,14 +98,14 @@ def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray,
 
 @cache
 def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
-    """(count, n) by plain code."""
+    """Accelerations (count, n) at the states of ``states``, by plain code."""
     suspension = Suspension(EVERY_VEHICLE[vehicle]())
     both, kept = states(suspension.size, count, len(suspension.tyres))
     return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
 
 
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
-    """(count, n) by an engine around the compiled forces."""
+    """Accelerations (count, n) at the states of ``states``, by an engine that calls the compiled forces."""
     model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
     wheels = wheels_of(vehicle)
     rows = wheel_forces_in(model.numbers, wheels)
@@ -115,14 +116,15 @@ def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarr
 
 
 def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
-    """Largest difference by the largest acceleration of each state; infinite where one is no number."""
+    """Largest difference of the accelerations, in each state divided by the largest acceleration; infinite where one of
+    them is not a number."""
     off = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
     return off if np.isfinite(off) else np.inf
 
 
 def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> Braked:
-    """The vehicle on wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis; lags :
-    whether its tyres relax over LENGTHS."""
+    """A vehicle steered to the left, with hysteresis in its brakes. Its road is dry on the left and wet on the right
+    for 3 m, then ice; lags: whether its tyres have the relaxation lengths LENGTHS."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
@@ -144,7 +146,7 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
 
 
 def controller(valves: bool, wheels: int = 4) -> Controller:
-    """Valves that a slip controller sets, or pressures that stay."""
+    """A slip controller that sets valves, or constant pressures."""
     return SlipBangBang(wheels=wheels) if valves else steady_torques(*wheels * (4e4,))
 
 
@@ -159,12 +161,13 @@ def run(
 def plain_run(
     vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
 ) -> BrakingPath:
-    """``run`` by plain code."""
+    """The same stop as ``run``, by plain code."""
     return run(EVERY_VEHICLE[vehicle](), "reference", duration, valves, speed, lags)
 
 
 def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
-    """Largest difference of positions, rates and rims (m, rad, per s) at common times; infinite if one ended early."""
+    """Largest difference of two paths in positions, rates and rim speeds (m, rad, per s); infinite if they have
+    different lengths."""
     if len(first.times) != len(other_path.times):
         return np.inf
     off = max(
@@ -175,8 +178,8 @@ def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
 
 
 def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
-    """Steady circle (m/s, m), its steer angles, state and turning in one row, by the engine's forces and by plain
-    code; a row of no numbers where there is none."""
+    """Steady circle at a speed (m/s) and radius (m), by the engine's forces and by plain code. Each row has steer
+    angles, wheel speeds and state; NaN where no steady turn exists."""
     rows = []
     for engine in ("mujoco", "reference"):
         on_suspension = vehicle_on(vehicle, engine, False)

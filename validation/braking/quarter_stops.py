@@ -44,7 +44,7 @@ class FrictionCurve(NamedTuple):
 
 
 class FrictionChange(NamedTuple):
-    """A road on which friction changes at a place (m)."""
+    """A road whose friction changes at a position (m)."""
 
     before: FrictionCurve
     behind: FrictionCurve
@@ -53,7 +53,7 @@ class FrictionChange(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def force_at(u, w, quarter, curve):
-    """Force (N) and slip of a wheel (rad/s) whose centre has a speed (m/s)."""
+    """Longitudinal force (N) and slip of a wheel with angular velocity w (rad/s), whose centre moves at u (m/s)."""
     u, mu = max(u, SLOWEST_SPEED), curve.mu
     slip = (u - quarter.radius * w) / u
     cell, share = cell_and_share(curve.slips, min(abs(slip), 1.0))
@@ -62,7 +62,7 @@ def force_at(u, w, quarter, curve):
 
 @njit(cache=True, error_model="numpy")
 def rates(u, w, torque, quarter, curve):
-    """Rates of speed and turning (m/s^2, rad/s^2); a brake holds a wheel that stands."""
+    """Time derivatives of u (m/s^2) and w (rad/s^2); the brake holds a wheel that does not turn."""
     force, _ = force_at(u, w, quarter, curve)
     brake = torque if w > 0.0 else min(torque, quarter.radius * force)
     return -force / quarter.mass, (quarter.radius * force - brake) / quarter.inertia
@@ -70,7 +70,7 @@ def rates(u, w, torque, quarter, curve):
 
 @njit(cache=True, error_model="numpy")
 def literal(u, w, torque, quarter, curve, step):
-    """One step of the paper's scheme; returns speed and turning."""
+    """Speed and angular velocity after one step of the scheme as printed in the paper."""
     mass, radius, inertia = quarter
     force, slip = force_at(u, w, quarter, curve)
     secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * curve.mu[1] / curve.slips[1]
@@ -81,8 +81,8 @@ def literal(u, w, torque, quarter, curve, step):
 
 @njit(cache=True, error_model="numpy")
 def advanced(scheme, u, w, torques, quarter, curve, step):
-    """Speed and turning after one step of a scheme, 0 Euler, 1 RK4, 2 literal, under the brake's torques (N m) at its
-    start and end."""
+    """Speed and angular velocity after one step of a scheme (0 Euler, 1 RK4, 2 literal), with brake torques (N m) at
+    the step's start and end."""
     now, then = torques
     middle = 0.5 * (now + then)
     if scheme == 2:
@@ -98,8 +98,8 @@ def advanced(scheme, u, w, torques, quarter, curve, step):
 
 @njit(cache=True, error_model="numpy")
 def march(scheme, u, w, torques, quarter, road, step):
-    """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, the steps (s) taken, -1 if it does not stop
-    under the torques (n + 1,) in N m at the ends of steps, and the speed (m/s) that is left.
+    """Stopping distance (m), number of steps (s) and remaining speed (m/s) by a scheme (0 Euler, 1 RK4, 2 literal).
+    torques (n + 1,): N m at the ends of the steps; the number of steps is -1 if the vehicle does not stop.
 
     u (m/s), w (rad/s) : speeds at the start; road : a ``FrictionChange``.
     """
@@ -117,7 +117,7 @@ def march(scheme, u, w, torques, quarter, road, step):
 def marched_quarter(
     scheme: int, quarter: Quarter, torques: np.ndarray, road: FrictionChange, speed: float, step: float
 ) -> tuple[float, int, float]:
-    """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
+    """``march`` for a quarter vehicle that starts with a rolling wheel at a speed (m/s)."""
     numbers = Numbers(quarter.mass, quarter.radius, quarter.spin_inertia)
     way, steps, left = march(scheme, speed, speed / quarter.radius, torques, numbers, road, step)
     return way, steps, left
@@ -126,7 +126,7 @@ def marched_quarter(
 def stopped(
     scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
 ) -> tuple[float, float]:
-    """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from rolling at a speed (m/s).
+    """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from a speed (m/s) with a rolling wheel.
 
     A scheme may chatter or creep for ever. After LONGEST_TIME_RATIO times the time that the torque alone would take,
     the way until then is given, with the speed (m/s) that is left, else 0.
@@ -140,7 +140,8 @@ def stopped(
 
 
 def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
-    """Stopping distance (m) from rolling under a constant torque (N m), to 1e-9 of it.
+    """Exact stopping distance (m), to a relative accuracy of 1e-9, under a constant torque (N m) from a speed (m/s)
+    with a rolling wheel.
 
     In the variable q with dt = u dq the slip has an equation of its own, s' = -(r^2 / J) (F - T / r) - (1 - s) F / m,
     and ln u falls by F / m: no speed stands in a denominator. Once the slip has settled, or is 1, the force is
@@ -172,13 +173,13 @@ STEP = 5.5e-3
 
 @cache
 def friction_table(surface_name: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
-    """Table of a surface, as it is and for compiled functions."""
+    """Tyre table of a surface, both as an object and in the form for compiled functions."""
     tyre = surface(surface_name, scale)
     return tyre, stacked([tyre])
 
 
 def steady_torque(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
-    """Force (N) at a slip and the torque (N m) under which it stays."""
+    """Tyre force (N) at a slip, and the brake torque (N m) that holds this slip constant."""
     force = quarter.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
     return force, quarter.steady_torque(slip, force)
 
@@ -192,8 +193,8 @@ def stop(
     after: float = 0.0,
     turning: float | None = None,
 ) -> QuarterStop:
-    """A run under a constant torque (N m) that lasts longer than the stop takes at the smaller of both forces, plus
-    ``after`` (s)."""
+    """A run under a constant torque (N m). It lasts ``after`` (s) longer than a stop would take with the smaller of two
+    forces: torque / radius, and locked-wheel friction."""
     least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
     steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
     return braked(quarter, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, turning)

@@ -16,7 +16,7 @@ CONTROLLERS = ("none", "none", "slip_bang_bang", "acceleration_phases", "five_ph
 
 @dataclass(frozen=True)
 class Draw:
-    """Plain numbers and names, drawn one after the other."""
+    """Generator of random numbers and choices in a fixed sequence."""
 
     random: np.random.Generator
 
@@ -33,12 +33,12 @@ class Draw:
         return self.random.choice(choices).item()
 
     def chance(self, share: float) -> bool:
-        """True in a share of the draws."""
+        """True with this probability."""
         return bool(self.random.random() < share)
 
 
 def random_stop(seed: int, number: int) -> dict[str, Any]:
-    """Table of one scene, the same for the same two numbers."""
+    """Table of one random scene; equal arguments give equal scenes."""
     draw = Draw(np.random.default_rng([seed, number]))
     kind = draw.choice("straight", "straight", "split", "j_turn", "j_turn", "turn")
     table: dict[str, Any] = {
@@ -87,13 +87,13 @@ def procedure(generator: Draw, kind: str) -> dict[str, Any]:
 
 
 def road(generator: Draw) -> dict[str, Any]:
-    """One to three stretches."""
+    """A random road of one to three stretches."""
     starts = [0.0, 12.0, 25.0][: generator.integer(1, 4)]
     return {"stretches": [{"x": x, "left": generator.choice(*SURFACES)} for x in starts]}
 
 
 def brakes(generator: Draw) -> dict[str, Any]:
-    """Loops of the axles, and the supply."""
+    """Random brake characteristics of the axles, with hysteresis, and a supply pressure."""
     table: dict[str, Any] = {"supply": generator.within(3.0, 10.0)}
     for axle in ("front", "rear", "trailer"):
         rising, push_out = generator.within(400.0, 3000.0), generator.within(0.0, 0.8)
@@ -107,7 +107,7 @@ def brakes(generator: Draw) -> dict[str, Any]:
 
 
 def axle(generator: Draw, x: float) -> dict[str, float]:
-    """Wheels of an axle."""
+    """Random parameters of an axle at x (m)."""
     return {
         "x": x,
         "track": generator.within(1.7, 2.1),

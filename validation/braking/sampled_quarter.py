@@ -28,7 +28,7 @@ Stretches = Sequence[tuple[float, Callable[[float], float]]]
 def own_distance(
     quarter: Quarter, brake: Brake, surface_name: str, controller: Controller, speed: float, substeps: int
 ) -> float:
-    """Stopping distance (m) by the product's step."""
+    """Stopping distance (m) by twinrig's time step."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
     vehicle = on_tyres(quarter.plane, [surface(surface_name)], of_wheels(brake), chambers, substeps=substeps)
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
@@ -37,7 +37,7 @@ def own_distance(
 def reference_distance(
     quarter: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
-    """Stopping distance (m) by the reference, at a relative tolerance."""
+    """Stopping distance (m) by an adaptive reference solver, at a relative tolerance."""
     curve = SURFACES[surface][0]
     return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
 
@@ -51,7 +51,8 @@ def tight_distance(
     tolerance: float = 1e-10,
     method: Any = "DOP853",
 ) -> float:
-    """Stopping distance (m) by the reference on a road of stretches; method : of scipy."""
+    """Stopping distance (m) by the reference solver on a road with several stretches; method: name of scipy's
+    solver."""
     y, pressure, torque, number = np.array([0.0, speed, speed / quarter.radius]), 0.0, 0.0, 0
     while y[1] > LAST_SPEED:
         given = Sample(number, round(number * SAMPLE * 1e9), y[2:] * quarter.radius, True, SUPPLY, float(y[1]))
@@ -64,7 +65,7 @@ def tight_distance(
 
 
 def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[float], tuple[float, float]]:
-    """Pressure (bar) and torque (N m) by the time (s) in a sample."""
+    """Function of the time (s) since the sample's start that gives brake pressure (bar) and torque (N m)."""
 
     def at(time: float) -> tuple[float, float]:
         p = pressure
@@ -79,13 +80,13 @@ def _law(pressure: float, torque: float, valve: int, brake: Brake) -> Callable[[
 
 
 def _friction_at(x: float, stretches: Stretches) -> tuple[Callable[[float], float], float]:
-    """mu by the slip at x (m), and where that ends."""
+    """Friction law mu(slip) at a position x (m), and the position (m) at which this stretch ends."""
     number = sum(begin <= x + 1e-10 for begin, _ in stretches[1:])
     return stretches[number][1], stretches[number + 1][0] if number + 1 < len(stretches) else np.inf
 
 
 def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, options: dict[str, Any]) -> np.ndarray:
-    """One sample from x, u, w; a wheel that stops is held while its brake can."""
+    """State x, u, w after one sample. A wheel that stops turning stays locked as long as its brake can hold it."""
     radius, inertia, load, now = quarter.radius, quarter.spin_inertia, quarter.mass * GRAVITY, 0.0
     mu, end = _friction_at(y[0], stretches)
 

@@ -31,7 +31,8 @@ GRADIENT = 2e4
 
 @cache
 def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
-    """1000 kg on four wheels of 30 kg, springs and tyres so many times as stiff, damped alike."""
+    """A box of 1000 kg on four wheels of 30 kg; springs and tyres are ``stiffer`` times as stiff, with the same damping
+    ratio."""
     wheels = {
         f"{x}{y}": (u * HALF, v * SIDE, RADIUS)
         for x, u in (("f", 1.0), ("r", -1.0))
@@ -66,8 +67,7 @@ def car() -> Sprung:
 
 
 def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
-    """Pitch (rad, nose down) of the box in steady braking, and the increase of its front axle load over that at rest
-    (N).
+    """Pitch (rad, nose down) of the box in steady braking, and the increase (N) of its front axle load from rest.
 
     About the ground, m a h + m g (h - r) theta = K theta: the contacts go forwards with their wheels. Each axle bears
     K theta / L of it. To first order in theta.
@@ -79,7 +79,7 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
 
 
 def constant(mu: float) -> TyreTable:
-    """Friction that a locked wheel has in every direction, and none before it slides."""
+    """Tyre table in which a sliding wheel has the same friction in every direction, and a rolling wheel has none."""
     slips, angles = np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.01, np.pi / 2.0])
     ahead, aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
     x = mu * ahead[:, None, None] * np.array([0.0, 1.0, 1.0])
@@ -100,7 +100,8 @@ def braked(
     substeps: int = 1,
     gradient: float = GRADIENT,
 ) -> Braked:
-    """The vehicle on one surface, brakes that follow at once; without an engine the plane one.
+    """The vehicle on one surface, with brakes that follow their command at once. Without an engine it is the plane
+    vehicle.
 
     steer : rad, of the front wheels; gradient : N m/bar. A controller of valves has SUPPLY.
     """
@@ -120,7 +121,7 @@ def braked(
 
 
 def stays(vehicle: Braked, path: BrakingPath, duration: float = 2.0) -> float:
-    """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
+    """Largest speed (m/s) of the vehicle or of a wheel's rim during a time (s) after a stop."""
     rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORTED, vehicle.plane.wheels))
     motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), rates, report)
     torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0

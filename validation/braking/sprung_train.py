@@ -36,13 +36,15 @@ class PulledCaravan:
 
 
 def locked_stop(speed: float = 1.5) -> tuple[float, float]:
-    """Way (m) of a stop from a speed (m/s) with all wheels locked, and that by friction alone, v^2 / (2 mu g)."""
+    """Stopping distance (m) from a speed (m/s) with all wheels locked, and the distance by friction alone, v^2 / (2 mu
+    g)."""
     path = braked(towing(), constant(SLIPPERY)).run(steady_torques(*6 * (LOCKS,)), speed)
     return float(path.states[-1, 0, 0]), speed**2 / (2.0 * SLIPPERY * GRAVITY)
 
 
 def pulled_by_levers() -> PulledCaravan:
-    """A caravan that brakes alone by its levers: moments about the ball, and momentum of the train.
+    """Deceleration, axle load and ball force, from moments about the ball and the train's momentum, of a train of which
+    only the caravan brakes.
 
     With N under its axle l behind the ball, its mass m2 c behind and d above that, the ball h above the road, and a
     deceleration a = mu N / M, M all masses and what the car's rolling wheels count for,
@@ -63,7 +65,8 @@ def pulled_by_levers() -> PulledCaravan:
 
 
 def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, float]:
-    """Mass (kg) of the car or of what it tows, and place of its centre ahead and above the road (m)."""
+    """Mass (kg) of the car or of its trailer, and the position (m) of its centre of mass: forward, and above the
+    road."""
     bodies = [body for body in vehicle.bodies if vehicle.towed_under(body.name) == towed]
     masses = np.array([body.mass for body in bodies])
     x, _, z = masses @ np.array([body.position for body in bodies]) / masses.sum()
@@ -71,7 +74,8 @@ def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
 
 
 def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
-    """A run in MuJoCo of a caravan that brakes alone, all its wheels locked; change : plants a fault in the table."""
+    """A run in MuJoCo of a train of which only the caravan brakes, with all its wheels locked; change: plants a fault
+    in the table."""
     vehicle = towing() if change is None else towing.__wrapped__()
     if change is not None:
         change(vehicle.handling)
@@ -84,25 +88,25 @@ def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4
 
 
 def _pull(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
-    """Force (N) at the ball by the balance of the caravan alone: its tyres' drag less what its own mass takes."""
+    """Longitudinal force (N) at the ball from the caravan's balance: tyre drag minus mass times deceleration."""
     mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
     return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing
 
 
 def hold_on_to_the_car(car: Handling) -> None:
-    """Plant a fault: brakes of the caravan hold on to the car."""
+    """Plant a fault: the caravan's wheels brake the car's body in place of the caravan's."""
     for i in range(4, len(car.vehicle.tyres)):
         car.tyre_numbers(i)[at.CARRYING] = car.tyre_numbers(0)[at.CARRYING]
 
 
 @cache
 def errors() -> PulledCaravan:
-    """A caravan that brakes alone, over its levers, less 1."""
+    """Relative differences between the simulated train of which only the caravan brakes and its closed form."""
     return relative_difference(pulled(), pulled_by_levers())
 
 
 def relative_difference(run: PulledCaravan, expected: PulledCaravan) -> PulledCaravan:
-    """Each of a run over what is wanted, less 1."""
+    """Relative difference of each quantity: ratio of the run's value to the expected one, minus 1."""
     return PulledCaravan(
         run.deceleration / expected.deceleration - 1.0, run.load / expected.load - 1.0, run.pull / expected.pull - 1.0
     )

@@ -17,7 +17,7 @@ SOLVER_TOLERANCE = 1e-9
 
 
 class Turned(NamedTuple):
-    """Where a vehicle is once it has slowed down: x, y (m), heading (rad) and time (s)."""
+    """Position x, y (m), heading (rad) and time (s) of a vehicle at the end of a braked turn."""
 
     x: float
     y: float
@@ -34,8 +34,8 @@ def braked_turn(
     until: float,
     length: float = 0.0,
 ) -> Turned:
-    """The end of a braked turn from steady rolling at a speed to another one (m/s), front wheels steered (rad), torques
-    of the axles (N m).
+    """Final position of a braked turn from steady rolling at ``speed`` down to ``until`` (m/s). The front wheels are
+    steered by an angle (rad); torques: brake torques of the two axles (N m).
 
     length : over which tyres relax (m); 0 for none. Above 1 m/s only they have no damper of their own. The tyre's
     friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
@@ -58,8 +58,8 @@ def braked_turn(
 
 
 class _Equations:
-    """Derivative of x, y, heading, speeds along and across, yaw rate, the speeds of the four wheels, and with a length
-    of relaxation the tan of their lagging slip angles."""
+    """Equations of a braked truck. The state has x, y, heading, longitudinal and lateral velocity, yaw rate and the
+    speeds of the four wheels; with a relaxation length also the tangents of the lagging slip angles."""
 
     def __init__(self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray, length: float = 0.0) -> None:
         self.vehicle, self.tyre, self.torques, self.length = vehicle, tyre, torques, length
@@ -93,7 +93,7 @@ class _Equations:
         return np.concatenate((moved, wheels, lags))
 
     def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """mu_x with the sign of the slip, and mu_y."""
+        """Longitudinal friction mu_x with the sign of the slip, and lateral friction mu_y."""
         tyre = self.tyre
         i, p = _cell(tyre.angles, angles)
         k, w = _cell(tyre.slips, np.abs(slips))
@@ -107,6 +107,6 @@ class _Equations:
 
 
 def _cell(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cells in which values lie and their shares."""
+    """For each value, the index of the cell between nodes in which it lies, and its relative position in the cell."""
     cell = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
     return cell, (values - nodes[cell]) / (nodes[cell + 1] - nodes[cell])

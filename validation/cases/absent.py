@@ -36,13 +36,13 @@ EFFECTS = names_of(DEFAULT_SYSTEM)
 
 
 def added_to(effect: str) -> dict[str, Any]:
-    """Tables of the effects that one needs."""
+    """Tables of the effects that an effect needs."""
     module = module_of(DEFAULT_SYSTEM, effect)
     return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
 def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = False) -> Scene:
-    """The asymmetric vehicle with some effects, released from a tilted start."""
+    """Scene: the asymmetric vehicle with some effects, released from a tilted position."""
     start = {} if guided else START
     return build_scene(
         {
@@ -59,7 +59,7 @@ def scene(effects: dict[str, Any], steps: int, folder: Path, guided: bool = Fals
 
 
 def write_files(folder: Path) -> None:
-    """Two seconds of wheel forces and of a pitch that both start smoothly."""
+    """Write files with two seconds of wheel forces and of pitch, both of which start smoothly."""
     t = STEP * np.arange(2001)
     wave = np.sin(np.pi * t) ** 2
     write_time_series(folder / "forces.csv", {"front": ("N", 4e3 + 300 * wave), "rear": ("N", 3e3 - 200 * wave)}, STEP)
@@ -69,12 +69,12 @@ def write_files(folder: Path) -> None:
 
 
 def model(bare: Scene, engine: str) -> Model:
-    """A scene built in an engine."""
+    """An engine's model of a scene."""
     return build(engine, assemble(bare), settings_of(bare, engine))
 
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
-    """A scene without and with an effect."""
+    """Two scenes that differ by one effect: without it and with it."""
     base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT_SYSTEM, effect)
     less = scene(base, steps, folder, guided)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
@@ -83,18 +83,18 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
 
 
 def counts_of_scene(bare: Scene, engine: str) -> dict[str, int]:
-    """Counts of what a scene builds in an engine, and of the channels it saves."""
+    """Numbers of components in an engine's model of a scene, and of the channels that are saved."""
     return {**model(bare, engine).plan(), "channels": len(run(bare, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
-    """Changes of the counts by an effect, without the zeros."""
+    """Counts that an effect changes in an engine, each with its change."""
     before, after = (counts_of_scene(bare, engine) for bare in pair(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
 def declared(effect: str, engine: str) -> dict[str, int]:
-    """Changes of the counts that the effect's file declares."""
+    """Changes of the counts that the effect's file declares for an engine."""
     table = module_of(DEFAULT_SYSTEM, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
@@ -116,7 +116,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _imports() -> list[Row]:
-    """Modules and compiled kernels of a fresh process that ran a bare scene in all engines."""
+    """Modules imported and kernels compiled in a fresh process that ran a bare scene in all engines."""
     probed = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START})
     foreign = [name for name in probed["modules"] if belongs_to_effects(name)]
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
@@ -136,7 +136,8 @@ def _imports() -> list[Row]:
 
 
 def _absence(engine: str, folder: Path) -> list[Row]:
-    """Frames, memory and callbacks of a bare march, short and long."""
+    """Rows: Python frames, memory and callbacks that a bare scene's march needs in 1,980 more steps; they must be
+    none."""
     for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
         march(engine, model(bare, engine))
     short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
@@ -166,7 +167,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
 
 
 def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
-    """Positive control: each effect changes the counts of every engine by exactly what it declares."""
+    """Rows of positive controls: each effect changes the counts of every engine by exactly what it declares."""
     changed = {engine: change(effect, engine, folder) for engine in engines}
     wanted = {engine: declared(effect, engine) for engine in engines}
     return behaves(
@@ -185,5 +186,5 @@ def _text(table: dict[str, dict[str, int]]) -> str:
 
 
 def changes(added_counts: dict[str, int]) -> str:
-    """Counts that an effect changes, in words."""
+    """Text of the counts that an effect changes."""
     return ", ".join(f"{value:+d} {key}" for key, value in sorted(added_counts.items()))

@@ -80,7 +80,8 @@ def _id(family: str, what: str) -> str:
 
 
 def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[str, float]]:
-    """The mechanism; where the output is of another start or spring, with those of the output, which are told."""
+    """The mechanism, and the constants that were fitted. If the output file has another start or another spring, the
+    mechanism takes the file's start, with spring constants fitted to its data."""
     if not mechanism.springs:
         return mechanism, {}
     shift = output.columns["Pos"][0] - mechanism.centre
@@ -98,7 +99,8 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
 
 
 def _sprung(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Travel and rate of the only spring on the output's motion, and its force there (m,), positive in extension."""
+    """Travel and rate of the only spring during the output's motion, and the spring force (m,) by the output, positive
+    in extension."""
     (spring,), motion = mechanism.springs, output.motion(mechanism)
     if spring.turns:
         axis = mechanism.ground.axes[:, 2]
@@ -111,7 +113,7 @@ def _sprung(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.nd
 
 
 def _angle(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sine and cosine (m,) of the turn about an axis."""
+    """Sine and cosine (m,) of the body's rotation about an axis."""
     side = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(axis, side) / np.linalg.norm(np.cross(axis, side))
     turned = motion.turned @ first
@@ -119,7 +121,7 @@ def _angle(motion: BodyMotion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def notes_rows(family: str, constants: dict[str, float]) -> list[Row]:
-    """What was read off a file: its model file has another start or other constants."""
+    """Rows with spring constants that were fitted to the output file, since its model file describes another case."""
     why = f"read off the first {READ_OFF_SECONDS:g} s of the output: the model file describes another case; calibrated"
     units = {"stiffness": "N/m or N m/rad", "damping": "N s/m or N m s/rad", "rest": "m or rad"}
     return [
@@ -129,7 +131,8 @@ def notes_rows(family: str, constants: dict[str, float]) -> list[Row]:
 
 
 def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bool = False) -> list[Row]:
-    """Rows of one model and its output: positions, reactions, reactions on the file's own motion, the twins."""
+    """Rows for one model and its output file: positions, reactions, reactions for the file's own motion, and the
+    engines."""
     duration = min(QUICK_DURATION if quick else DURATION, float(output.times[-1]))
     motion, reaction = ConstrainedBody(mechanism).run(duration, STEP, STEPS_PER_ROW)
     runs = {"reference": (motion, reaction)}
@@ -146,7 +149,7 @@ def family_rows(family: str, mechanism: Mechanism, output: OutputFile, quick: bo
 
 
 def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: float) -> list[Row]:
-    """Rows that compare the joint in MJCF with its certificate by ``twinrig twin``, and its paths with those of
+    """Rows for the joint as an MJCF model: the certificate of ``twinrig twin``, and paths compared with those of
     constraint equations."""
     step, every = STEP / JOINT_STEPS, JOINT_STEPS * STEPS_PER_ROW
     accelerations, paths = examined(mechanism, folder, round(duration / step), step)
@@ -164,7 +167,8 @@ def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: fl
 
 
 def _largest_reaction(mechanism: Mechanism, reaction: Reaction) -> tuple[float, float]:
-    """Largest force (N) of a reaction, or the weight, and that by the arm of the centre, or 1 m, as a moment (N m)."""
+    """Reference sizes for reactions: the larger of largest force and weight (N), and this force times the distance of
+    the centre from the joint, at least 1 m (N m)."""
     weight = mechanism.mass * float(np.linalg.norm(mechanism.gravity))
     force = max(float(np.abs(reaction.force).max()), weight)
     return force, force * max(float(np.linalg.norm(mechanism.centre - mechanism.ground.place)), 1.0)
@@ -173,14 +177,15 @@ def _largest_reaction(mechanism: Mechanism, reaction: Reaction) -> tuple[float, 
 def _reaction_difference(
     mechanism: Mechanism, one: Reaction, two: Reaction, rounding: tuple[Any, Any] = (0.0, 0.0)
 ) -> float:
-    """Largest difference of two reactions, less what rounding may explain, by the largest."""
+    """Largest difference of two reactions beyond rounding, divided by the sizes of ``_largest_reaction``."""
     force, moment = _largest_reaction(mechanism, two)
     off = np.abs(one.force - two.force) - rounding[0], np.abs(one.moment - two.moment) - rounding[1]
     return max(0.0, float(off[0].max()) / force, float(off[1].max()) / moment)
 
 
 def _own_motion(family: str, mechanism: Mechanism, output: OutputFile) -> Row:
-    """Reactions on the file's own motion: no integration takes part."""
+    """Row: reactions by Newton's and Euler's equations from the motion in the file, compared with the file's; no
+    integration is involved."""
     off = _reaction_difference(mechanism, output.reaction_of_motion(mechanism), output.reaction())
     why = "Newton's and Euler's equations on the motion that the file tells; the bound asked for"
     quantity = f"{family}: reaction on the file's own motion, by the largest"
@@ -218,7 +223,8 @@ def _against_file(
 
 
 def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: float) -> Row:
-    """Positions a tenth of a second after each of the file's own states: its error has no time to add up.
+    """Row: error of the position 0.1 s after each of the file's own states, a time in which the file's integration
+    error cannot grow.
 
     What energy the file loses meanwhile, dE, changes its speed by dE / (m v), and its place by that for this time.
     """
@@ -238,7 +244,7 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
 
 
 def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolute: Path) -> list[Row]:
-    """The joint beside the other code's file of the same pendulum on a hinge, whose motion keeps its energy.
+    """Rows: the joint compared with the other code's file of the same pendulum on a hinge, in which the energy is kept.
 
     A body that starts at rest on a ball or a cross swings in a plane. Mass, arm and moment of inertia are those of the
     Revolute case: the other code's files of one motion must agree with one another, too.
@@ -276,7 +282,7 @@ def _same_pendulum(family: str, mechanism: Mechanism, output: OutputFile, revolu
 def _twin(
     family: str, name: str, mechanism: Mechanism, run: tuple[BodyMotion, Reaction], plain: tuple[BodyMotion, Reaction]
 ) -> Row:
-    """An engine's joints against the reference's constraints."""
+    """Rows: a mechanism built of joints in an engine, compared with the reference's constraint equations."""
     place = float(np.abs(run[0].place - plain[0].place).max())
     turned = float(np.abs(run[0].turned - plain[0].turned).max())
     off = max(place, turned, _reaction_difference(mechanism, run[1], plain[1]))

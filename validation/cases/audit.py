@@ -14,7 +14,7 @@ STATES = 100
 
 
 def scene(parameters: str, geometry: str = "exact"):
-    """The vehicle on the study road, whose input takes part in the audit."""
+    """The scene of a vehicle on the study road, whose heights enter the comparison."""
     return build_scene(
         {
             "title": TITLE,
@@ -26,7 +26,8 @@ def scene(parameters: str, geometry: str = "exact"):
 
 
 def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
-    """Largest difference to the reference, relative to the largest acceleration, over all states."""
+    """Largest difference of an engine's accelerations from the reference over all states, divided by the largest
+    acceleration."""
     audited = scene(parameters, geometry)
     return acceleration_gap(checks.engine(engine), assemble(audited), settings_of(audited, engine), STATES)
 

@@ -92,7 +92,7 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
 
 
 def _fault_rows(bicycle: Whipple) -> list[Row]:
-    """A trail that is a thousandth longer must not pass as the published bicycle."""
+    """Row: a trail that is 0.1 % longer must be told apart from the published bicycle."""
     wrong = bicycle.changed(trail=FAULT * bicycle.trail)
     caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED[SPEED]).max())
     said = "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
@@ -101,14 +101,16 @@ def _fault_rows(bicycle: Whipple) -> list[Row]:
 
 
 def _gaps(bicycle: Whipple, engine: str) -> np.ndarray:
-    """Largest distance (1/s) of eigenvalues on tyres from those of ideal rolling, by stiffness."""
+    """Largest distance (1/s) between the eigenvalues of the bicycle on tyres and with ideal rolling, for each tyre
+    stiffness."""
     wanted = bicycle.eigenvalues(SPEED)
     stiff = [RollingBicycle(bicycle, BicycleTyre(stiffness=s)) for s in STIFFNESS]
     return np.array([np.abs(engine_eigenvalues(engine, rolling, SPEED) - wanted).max() for rolling in stiff])
 
 
 def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
-    """Rows: order of convergence in each engine, the extrapolated limit, and the difference of the engines."""
+    """Rows on the limit of stiff tyres: order of convergence in each engine, extrapolated limit, and difference between
+    the engines."""
     rows = []
     for engine, gap in gaps.items():
         order = np.log(gap[-2] / gap[-1]) / np.log(STIFFNESS[-1] / STIFFNESS[-2])
@@ -135,7 +137,7 @@ def _limit_rows(gaps: dict[str, np.ndarray]) -> list[Row]:
 
 
 def _energy_rows(duration: float) -> list[Row]:
-    """Energy of the benchmark run with ideal rolling, and the ledger on tyres."""
+    """Rows: change of energy in the benchmark's run with ideal rolling, and energy balance on tyres."""
     table = {"title": "benchmark run", "system": "bicycle", "run": {"duration": duration}}
     scene, rows = build(table), []
     for engine in ("reference", *ENGINES):
@@ -163,7 +165,8 @@ def _energy_rows(duration: float) -> list[Row]:
 
 
 def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
-    """The measured bicycle with nothing fitted, and every speed by a choice on the others."""
+    """Rows on the measured bicycle: predictions with nothing fitted, and predictions of each speed from a choice on the
+    others."""
     root = os.environ.get("TWINRIG_DATA")
     folder = Path(root) / "bicycle" if root else None
     if folder is None or not (folder / "windows.csv").is_file():
@@ -225,7 +228,7 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
 
 
 def _choice_rows(choice: Choice) -> list[Row]:
-    """What the data call for, at the level of 5 %, beside what the experimenters suspected."""
+    """Rows: suspects that the data call for at a significance level of 5 %, and what the experimenters suspected."""
     told = ", ".join(f"{name} {value:.3g}" for name, value in zip(choice.best.names, choice.best.values, strict=True))
     return [
         Observed(

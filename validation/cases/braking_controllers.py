@@ -74,13 +74,15 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def loop(brake: Brake, low: float, high: float, points: int = 2000) -> tuple[np.ndarray, np.ndarray]:
-    """Pressures (bar) and torques (N m) of one run from high down to low and up again, after a rise from none."""
+    """Pressures (bar) and torques (N m) of one hysteresis loop from high to low pressure and back, after a first rise
+    from zero."""
     path = np.concatenate((np.linspace(high, low, points), np.linspace(low, high, points)))
     return path, torques(path, of_wheels(brake))
 
 
 def loop_area(brake: Brake, low: float, high: float) -> float:
-    """Closed form of the area (N m bar) of a loop: four corners, the highest and the lowest of them on the lines."""
+    """Area (N m bar) of the hysteresis loop in closed form, as a polygon of four corners on the lines of rising and
+    falling pressure."""
     most = brake.rising * (high - brake.push_out)
     least = brake.falling * max(low - brake.release, 0.0)
     a, b = brake.release + most / brake.falling, brake.push_out + least / brake.rising
@@ -125,7 +127,7 @@ def _loop_rows() -> list[Row]:
 
 
 def _supply_row() -> Row:
-    """Four strokes from a reservoir whose supply is cut: what the fifth still has."""
+    """Row: pressure that remains at the fifth brake stroke when the supply is cut off, compared with a closed form."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
     air, ends = resting_chambers(chambers, SAMPLE), np.empty((5, 4))
@@ -191,7 +193,8 @@ def truck_stop(surface_name: str, name: str, speed: float) -> Recorded:
 
 
 def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
-    """Figures of one stop: distance (m), time (s), utilisation above 15 km/h, longest lock there (ms)."""
+    """Figures of one stop: distance (m), time (s), and above 15 km/h the friction utilisation and the longest wheel
+    lock (ms)."""
     path = truck_stop(surface_name, name, speed)
     speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE))
@@ -206,7 +209,7 @@ def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
 
 
 def _longest(flags: np.ndarray) -> int:
-    """Length of the longest run of true ones."""
+    """Length of the longest sequence of true values."""
     ends = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
     return int((ends[1::2] - ends[::2]).max(initial=0))
 
@@ -251,7 +254,8 @@ def _substep_rows() -> list[Row]:
 
 
 def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
-    """Two ensembles on ice from speeds drawn apart: one run proves nothing there."""
+    """Rows: two ensembles of stops on ice with different substeps, from slightly varied speeds, because single stops on
+    ice do not repeat."""
     random = np.random.default_rng(SEED)
     speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, runs)))
     distances = [

@@ -72,7 +72,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> Turned:
-    """The truck from SPEED to another (m/s) on ice; the last step is shared in proportion."""
+    """A braked turn of the truck on ice from SPEED down to ``until`` (m/s). Its end is interpolated linearly within the
+    last step."""
     truck = RollingTruck(
         on_road(PLANE, stacked([ICE]), slope=ICE.cornering), SPEED, steer=steer, step_function=step_function
     )
@@ -86,7 +87,7 @@ def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] =
 
 
 def speed(steps: int) -> float:
-    """Simulated seconds of a straight stop in one of the processor."""
+    """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
     vehicle = on_tyres(PLANE, [ICE], PAPER_BRAKES, chambers, substeps=steps)
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
@@ -136,14 +137,14 @@ def _symmetry_rows(until: float, steered: Turned) -> list[Row]:
 
 
 def rolling(slope: float) -> Tables:
-    """Friction across the wheel alone, steep as ``slope`` (1/rad) up to 0.01 rad."""
+    """Tyre tables with lateral friction alone, which rises with a slope (1/rad) up to 0.01 rad."""
     mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
 
 def _trailer_rows(quick: bool) -> list[Row]:
-    """Straight pull at 0.2 m/s; circle of 15 m at 0.5 m/s in the full share."""
+    """Rows on the trailer: pulled straight at 0.2 m/s; in the full share also on a circle of 15 m at 0.5 m/s."""
     why = "wheels that only roll: low speed, stiff tyres"
     rows = [
         Observed(
@@ -169,7 +170,8 @@ def _trailer_rows(quick: bool) -> list[Row]:
 
 
 def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, duration: float = 4.0) -> float:
-    """Error of tan(psi / 2) = tan(psi_0 / 2) exp(-v t / L), relative to the angle."""
+    """Relative error of the drawbar angle psi after a straight pull, where tan(psi / 2) = tan(psi_0 / 2) exp(-v t /
+    L)."""
     n = round(duration / step)
     state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN.drawbar, 0.0]])
     states, _ = follow(
@@ -180,7 +182,8 @@ def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, durati
 
 
 def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: float = 20.0) -> tuple[float, float]:
-    """Errors of R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 - wheelbase^2, relative to the radii."""
+    """Relative errors of the axle radii on a steady circle, where R_front^2 = R_hook^2 - L^2 and R_rear^2 = R_front^2 -
+    wheelbase^2."""
     turn, times = v / radius, step * np.arange(round(duration / step) + 1)
     hook = v * np.column_stack((-np.sin(turn * times), np.cos(turn * times)))
     front = np.sqrt(radius**2 - CHOSEN.drawbar**2)

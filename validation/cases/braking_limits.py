@@ -47,7 +47,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def ending_text(number: int) -> str:
-    """Phrase on how a random stop ended: "" if the vehicle came to rest."""
+    """Text on how a random stop ended; "" if the vehicle came to rest."""
     try:
         path = run(build(random_stop(SEED, number))).detail
     except RunFailed as error:
@@ -72,7 +72,7 @@ def _scene(**tables: Any) -> Any:
 
 
 def _error_of_procedure(scene: Any) -> RunFailed | None:
-    """Error of a scene's only procedure; None if it ran."""
+    """The error with which a scene's only procedure fails; None if it runs."""
     try:
         run(scene)
     except RunFailed as error:
@@ -81,7 +81,7 @@ def _error_of_procedure(scene: Any) -> RunFailed | None:
 
 
 def _jackknife_row() -> Row:
-    """The drawbar's angle when the run ends, of a train whose truck slides round: against its limit."""
+    """Row: drawbar angle at which the run of a train ends whose truck slides round, compared with the limit angle."""
     end = _error_of_procedure(
         _scene(
             vehicle={"override": {"mass": 4200.0, "yaw_inertia": 15000.0}},
@@ -110,7 +110,8 @@ def _jackknife_row() -> Row:
 
 
 def _roll_rows() -> list[Row]:
-    """A high truck of one track in a J-turn on dry road: lateral acceleration at which it is told to roll over."""
+    """Rows: a high truck with a narrow track in a J-turn on dry road, and the lateral acceleration at which rollover is
+    reported."""
     track, height = 1.8, 2.2
     axle = {"track": track}
     end = _error_of_procedure(
@@ -145,7 +146,7 @@ def _roll_rows() -> list[Row]:
 
 
 def _slow_apply_row() -> Row:
-    """Pressure of a chamber that fills slowly, against its exponential."""
+    """Row: pressure in a chamber that fills slowly, compared with its exponential."""
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
@@ -160,7 +161,8 @@ def _slow_apply_row() -> Row:
 
 
 def _cycle_row() -> Row:
-    """The limit cycle from a rolling wheel whose brake is applied fast, against the exact one, begun slowly."""
+    """Row: limit cycle of the controller after a fast first application to a rolling wheel, compared with the exact
+    cycle after a slow one."""
     frozen = Frozen(20.0, 16900.0, 0.5, 13.35, LINE, surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
@@ -175,7 +177,7 @@ def _cycle_row() -> Row:
 
 
 def _yaw_row(speed: float) -> Row:
-    """Final yaw of a stop on split friction, steps of 20 ms against 0.1 ms."""
+    """Row: final yaw of a stop on split friction with steps of 20 ms, compared with steps of 0.1 ms."""
 
     def yaw(substeps: int) -> float:
         scene = _scene(

@@ -113,7 +113,7 @@ def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
 
 
 def _tables_of_ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
-    """Tables of all ways by name; text tells why one is not there."""
+    """Scene tables of all ways to connect a controller, by name, and a text on those that are not available."""
     ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
     if second:
         ways["second process in Python"] = {
@@ -141,7 +141,8 @@ def _built_fmu(folder: Path) -> dict[str, Any] | str:
 
 
 def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
-    """Every way against the callable, then the replay of its log."""
+    """Rows: every way to connect a controller compared bit by bit with a direct call, and then the replay of its
+    log."""
     first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
@@ -158,7 +159,7 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
 
 
 def _pressures_move(path: Driven) -> Row:
-    """Bits could be the same of a controller that does nothing."""
+    """Row: pressures change direction often, since a controller that does nothing would give equal bits in any case."""
     turns = int((np.diff(np.sign(np.diff(path.pressures, axis=0)), axis=0) != 0).sum())
     return behaves(
         "braking_port.bits.alive",
@@ -177,7 +178,8 @@ def _compare_bits(path: Driven, other_run: Driven) -> str:
 
 
 def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> dict[str, list[float]]:
-    """Microseconds of one exchange by way: median of the rounds with its 95 % interval."""
+    """Time of one exchange in microseconds for each way to connect a controller: median of the rounds with its 95 %
+    interval."""
     facts, seconds = ControllerRun(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
@@ -243,7 +245,7 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
 
 
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Ending of a run whose controller fails, and the time from its last good sample."""
+    """How a run with a failing controller ends, and the time (s) since its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
     told = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
@@ -256,7 +258,7 @@ def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[s
 
 
 class _Watch:
-    """Notes when each exchange begins."""
+    """Wrapper of a controller that records when each exchange begins."""
 
     def __enter__(self) -> "_Watch":
         from models.systems.braking import march

@@ -44,7 +44,8 @@ def _rise_row(engine: str) -> Row:
 
 
 def rise_apart(engine: str, samples: int = 20) -> float:
-    """The car at a speed whose front wheels are turned by a step: tan of the slip angle in the middle of each step."""
+    """Largest error of the rise of the slip angle's tangent, against its exponential, after a steer step at constant
+    speed."""
     slick = surface("wet").scaled(SLICK)
     vehicle = replace(braked(car(), slick, engine, STEER), relaxation=whole.LENGTHS)
     path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
@@ -54,8 +55,8 @@ def rise_apart(engine: str, samples: int = 20) -> float:
 
 
 def turn(engine: str | None, length: float, stiffer: float | None = None, duration: float = 0.2) -> Run:
-    """A braked turn of the car, or of the box so many times as stiff, on tyres of a relaxation length (m), 0 for none;
-    without an engine in the plane."""
+    """A braked turn of the car, or of the box with suspension ``stiffer`` times as stiff, on tyres with a relaxation
+    length (m, 0 for none). Without an engine the vehicle is plane."""
     vehicle = car() if stiffer is None else box(stiffer, 0.01)
     torques, substeps = steady_torques(*TURNING), 2 if stiffer is None else 4
     vehicle_on_tyres = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
@@ -73,7 +74,8 @@ def _short_row(engine: str) -> Row:
 
 
 def short_ratio(engine: str) -> float:
-    """Ratio of the moves (m, rad) of the first coordinates."""
+    """Ratio of how far the final position and heading (m, rad) move by a relaxation length of 0.2 m to how far by 0.1
+    m."""
     none, short, long = (turn(engine, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
     return float(np.abs(long - none).max() / np.abs(short - none).max())
 

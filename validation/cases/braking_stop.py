@@ -83,8 +83,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
-    """Curves over the step, of our scheme and the others: error of the stopping distance and speed at which it still
-    rolls."""
+    """For twinrig's scheme and the others, over the step: relative error of the stopping distance, and the speed that
+    is left where a scheme does not stop."""
     tyre, _ = both = friction_table(name)
     force, torque = steady_torque(FRONT, tyre, slip)
     true = exact_distance(FRONT, tyre, torque, speed)
@@ -152,7 +152,7 @@ def _further_row(name: str, surface: str, slip: float, speed: float, mass: float
 
 
 def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
-    """Names of the rules that a stop breaks."""
+    """Names of the rules of plausibility that a stop breaks."""
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {

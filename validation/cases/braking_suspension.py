@@ -40,7 +40,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _locked_rows(mu: float) -> list[Row]:
-    """Rows of the box and of the car with locked wheels, from a speed at which they brake for 4 s."""
+    """Rows of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
         vehicle, place = braked(vehicle_kind, constant(mu)), f"{name}.{mu:g}"
@@ -119,7 +119,7 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
 
 
 def _engine_rows(wet: TyreTable) -> list[Row]:
-    """Rows of stops in both engines, in steps of 1 ms."""
+    """Rows of stops in both engines with steps of 1 ms."""
     ends = [
         braked(car(), wet, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
@@ -159,7 +159,7 @@ def _order_rows(wet: TyreTable) -> list[Row]:
 
 
 def _ice_rows() -> list[Row]:
-    """The slip controller on ice, beside the plane vehicle with load transfer under it."""
+    """Rows: the slip controller on ice with the suspension, compared with the plane vehicle with load transfer."""
     ice, speed = surface("ice"), 11.11
     stops = [
         Stop(braked(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
@@ -185,7 +185,7 @@ def _ice_rows() -> list[Row]:
 
 
 class _Timed:
-    """A controller that keeps the seconds which the vehicle took before each of its samples."""
+    """Wrapper of a controller that records how many seconds the vehicle's model took before each sample."""
 
     def __init__(self, controller: Controller) -> None:
         self.controller, self.answered, self.seconds = controller, math.nan, list[float]()
@@ -199,7 +199,7 @@ class _Timed:
 
 
 def _speed_row(wet: TyreTable) -> Row:
-    """Row on the computing time: of the tenth part of samples that the rest of the machine disturbs least."""
+    """Row on the computing time, from the fastest tenth of the samples, which other processes disturb least."""
     vehicle, controller = braked(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
@@ -217,7 +217,8 @@ def _speed_row(wet: TyreTable) -> Row:
 
 
 def limit(tyre: TyreTable) -> list[list[float]]:
-    """Stiffness, and how far from the plane vehicle with load transfer the box ends a J-turn (m), wheels light."""
+    """Distance (m) between the ends of a J-turn of the box on its suspension and of the plane vehicle with load
+    transfer, for three stiffnesses. Rows: stiffness factor, distance. The wheels have hardly any inertia."""
     distances = []
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)

@@ -132,7 +132,7 @@ def _control_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """Faults that both engines share, planted in the table of their forces."""
+    """Rows: faults planted in the force table that both engines share."""
     held = train.relative_difference(train.pulled(train.hold_on_to_the_car), train.pulled_by_levers())
     turned = whole.towing.__wrapped__()
     keep_to_the_car(turned.handling)

@@ -35,8 +35,8 @@ JUDGED_CHANGES = (1e-4, 0.05)
 
 @dataclass(frozen=True)
 class Judged:
-    """A scene with its choice of effects, the largest error of the identity of covariance and adjoint, and the changes
-    (quantities,) by frequency responses, or None.
+    """A random scene with its choice of effects and what independent routes say of it. identity: largest error of the
+    identity that relates covariance and adjoint; by_frequency: changes (quantities,) by frequency responses, or None.
 
     nearby : worst change at random speeds and with random parameters, by the tolerance; measured : saving by the
     covariance of what runs sample.
@@ -51,18 +51,19 @@ class Judged:
 
     @property
     def saving(self) -> float:
-        """Calls at equal accuracy of the whole scene divided by those of what is left."""
+        """Ratio of the calls at equal accuracy of the complete scene to those of the reduced scene."""
         return self.choice.before.calls / self.choice.after.calls
 
     @property
     def honest(self) -> bool:
-        """Whether no route finds a tolerance broken that was reported as kept."""
+        """False if the choice claims to keep the tolerance and another route finds that it does not."""
         changes = self.choice.confirmed if self.by_frequency is None else self.by_frequency
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
 def judged(scene: DrawnRide, second: bool) -> Judged:
-    """Choose, then certify by the identity and, where asked, by frequency."""
+    """Choose effects for a scene, then check the choice by the identity of covariance and adjoint and, if ``second``,
+    by frequency responses."""
     chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
     rest = whole.reduced(without(scene.scene, choice.left_out))
@@ -131,8 +132,8 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
 
 
 def _prediction_row(choices: list[Judged]) -> Row:
-    """Row: predicted / confirmed change, over all choices and quantities whose change differs from zero and is below 5
-    %."""
+    """Row: ratios of predicted to confirmed changes, over all choices and quantities whose change is above zero and
+    below 5 %."""
     predicted, confirmed_ = (
         np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
     )
@@ -165,7 +166,8 @@ def _identity_row(choices: list[Judged]) -> Row:
 
 
 def _equal_rows(choices: list[Judged]) -> list[Row]:
-    """Rows over all scenes: the tolerance nearby, and what is saved, by routes that the choice does not go."""
+    """Rows over all scenes: whether the tolerance holds near each scene as well, and the saving, both by routes that
+    the choice itself does not use."""
     told = sum(bool(each.choice.said) and not each.choice.left_out for each in choices)
     gaps = [abs(each.saving / each.measured - 1.0) for each in choices]
     saving = [each for each in choices if each.choice.left_out]
@@ -225,7 +227,8 @@ def _saving_row(choices: list[Judged]) -> Row:
 
 
 def _count_rows() -> list[Row]:
-    """What the choice solves for a car of 19 degrees of freedom; seconds are on the page of prices."""
+    """Rows: numbers of eigenvalue problems and Lyapunov equations that a choice solves for a car of 19 degrees of
+    freedom."""
     chooser = Chooser.of(whole_car())
     chooser.choose()
     pairs = len(chooser.effects) ** 2
@@ -250,7 +253,8 @@ def _paper() -> Chooser:
 
 
 def _pair() -> tuple[list[Row], dict[str, Any]]:
-    """Wheel mass and tyre damper of the published half car: one alone ruins, both together are cheap."""
+    """Rows on wheel mass and tyre damper of the published half car: leaving out one alone spoils the result, leaving
+    out both hardly changes it."""
     chooser = _paper()
     choice = chooser.choose()
     named = {effect.name: effect for effect in choice.candidates}
@@ -287,7 +291,8 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
 
 
 def _activity_rows() -> list[Row]:
-    """Pitch inertia is active, and irrelevant to bounce."""
+    """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
+    symmetric body."""
     chooser = _paper()
     watts = activity(chooser.full_scenes[0])
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
@@ -343,7 +348,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Draw predicted over confirmed changes of the choice, and the computing time saved over the tolerance."""
+    """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -38,14 +38,15 @@ JUDGED_CHANGES = (1e-4, 0.05)
 
 
 def judged(system: str, seed: int) -> JudgedByRuns:
-    """The scene of a seed."""
+    """Choose effects for the random scene of a seed, and judge the choice."""
     if system == "ride":
         return judged_ride(drawn_bent(seed))
     return judged_of(draw_scene(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
 def judged_ride(asked: BentRide) -> JudgedByRuns:
-    """Choose, and run the vehicle and what is left on roads that the choice has not seen."""
+    """Choose effects for a ride, then compare the complete and the reduced vehicle on new roads that the choice did not
+    use."""
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
     fresh = Variants(asked.opened(FRESH_COPIES_RATIO * COPIES, FRESH_SEED), engine)
@@ -57,7 +58,8 @@ def judged_ride(asked: BentRide) -> JudgedByRuns:
 
 
 def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) -> float:
-    """Least relative change of a deviation that mean squares (m,) are sure of, by resampling the copies."""
+    """Smallest relative change of a standard deviation that is significant, by resampling the mean squares (m,) of the
+    Monte Carlo copies."""
     picked = np.random.default_rng(FRESH_SEED).integers(
         len(full_mean_squares), size=(RESAMPLED, len(full_mean_squares))
     )
@@ -96,7 +98,8 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
 
 
 def _refused() -> Row:
-    """A ride with few copies and a fine tolerance, which chance alone could break."""
+    """Row: a choice is refused for a ride with few copies and a fine tolerance, since random scatter could exceed this
+    tolerance."""
     asked, said = drawn_bent(NOISY_RIDE), "a choice"
     try:
         Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
@@ -114,8 +117,7 @@ def _refused() -> Row:
 
 
 def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
-    """Predicted and confirmed changes (n, 2) of all quantities whose change differs significantly from zero and is
-    below 5 %."""
+    """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
     pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
@@ -207,7 +209,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Predicted against confirmed changes, and savings over tolerance."""
+    """Plot predicted over confirmed changes, and savings over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

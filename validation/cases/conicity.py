@@ -48,7 +48,7 @@ def _closed_form_row(id: str, quantity: str, off: float, why: str) -> Row:
 
 
 def _closed_forms() -> list[Row]:
-    """Tables that are straight between their rows: what is left is rounding."""
+    """Rows on tables of rolling radii that are linear between their rows, so that errors are due to rounding alone."""
     cone = max(abs(equivalent_conicity(Y, 0.1 * Y, a) / 0.05 - 1.0) for a in (0.1, 3.0, 8.0))
     wave = klingel_wave(RollingRadiusTable(Y, 0.1 * Y + 1.0 * 0.1), 3.0)
     tread = np.where(np.abs(Y) < 3.0, 0.05 * Y, np.sign(Y) * (0.15 + 0.8 * (np.abs(Y) - 3.0)))
@@ -100,7 +100,8 @@ def _closed_forms() -> list[Row]:
 
 
 def two_slopes(inner: float, outer: float, bend: float, amplitude: float) -> float:
-    """Period where dr has the slope ``inner`` up to ``bend`` and ``outer`` beyond, at an amplitude beyond."""
+    """Period of the wave where the radius difference dr has the slope ``inner`` up to ``bend``, and ``outer`` beyond
+    it. The amplitude is larger than ``bend``."""
     rest = inner * bend / outer
     deep, root = amplitude - bend + rest, math.sqrt(outer)
     speed = root * math.sqrt(deep**2 - rest**2)
@@ -109,7 +110,8 @@ def two_slopes(inner: float, outer: float, bend: float, amplitude: float) -> flo
 
 
 def _cubic() -> Row:
-    """A smooth dr on a table: an elliptic integral; what is left is the table's spacing, and falls with its square."""
+    """Row: a cubic dr in a table, against an elliptic integral. The error is due to the table's spacing, and falls with
+    its square."""
     a, b, amplitude = 0.1, 0.02, 4.0
     stiff = a + b * amplitude**2
     exact = 4.0 * float(ellipk(b * amplitude**2 / (2.0 * stiff))) / math.sqrt(stiff)
@@ -138,7 +140,7 @@ def _refused() -> Row:
 
 
 def _standard(name: str) -> tuple[list[Row], dict[str, Any]]:
-    """Rows on one of the standard's reference profiles; what is drawn."""
+    """Rows on one of the standard's reference profiles, and data for the figure."""
     quantities = (f"{name}: amplitudes outside of the standard's limits", f"{name}: largest error")
     data = data_folder()
     table_file = None if data is None else data / FOLDER / f"dr_ce_{name}.dat"
@@ -178,7 +180,7 @@ def _harmonic(y: np.ndarray, dr: np.ndarray, wave: KlingelWave) -> float:
 
 
 def _mirrored_profiles() -> list[Row]:
-    """Wheels of 920 and 918 mm on their rails, and the same exchanged."""
+    """Rows: wheels of 920 and 918 mm with their rails, and the mirror image with both exchanged."""
     profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)
     large, small = profiles.side(0.460), profiles.side(0.459)
     there, back = (
@@ -196,7 +198,7 @@ def _mirrored_profiles() -> list[Row]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Both conicities of the standard's profiles within its limits."""
+    """Plot both conicities of the standard's profiles with the standard's limits."""
     from models.drawing.figures import BLUE, VERMILION, heading, legend_below, panels
 
     standard = data["standard"]

@@ -49,8 +49,8 @@ WHY = "median of the ratios within interleaved rounds, seconds of the processor;
 
 @dataclass(frozen=True)
 class Setup:
-    """Set-up of a march with contact. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory
-    and cells, None where nothing is computed."""
+    """One way to march wheels with contact. bridge: how the engine calls the contact forces (none, empty, native,
+    jitted, plain, or a route of Exudyn's); law: contact theory and cells, None where no contact is computed."""
 
     engine: str
     method: str
@@ -59,7 +59,7 @@ class Setup:
     count: int
 
     def what(self) -> str:
-        """The law by its name."""
+        """Name of the contact law."""
         if self.law is None:
             return "no contact" if self.bridge == "none" else "empty callback"
         theory, cells = self.law
@@ -67,16 +67,16 @@ class Setup:
 
     @property
     def told(self) -> bool:
-        """Whether a row tells what it costs."""
+        """Whether the report has a row on this set-up's cost."""
         return (self.law, self.count) == (MAIN, 4) and self.bridge in ("native", ROUTES[0])
 
     @property
     def without(self) -> "Setup":
-        """A copy of the set-up without contact."""
+        """The same set-up without contact."""
         return replace(self, bridge="none", law=None)
 
     def wheels(self) -> Wheels:
-        """The wheels that are marched."""
+        """The wheels of this set-up."""
         theory, cells = self.law or ("none", 21)
         return Wheels(self.count, cast(Theory, theory), cells or 21)
 
@@ -111,7 +111,7 @@ def every() -> list[Setup]:
 
 
 class Prices:
-    """Seconds per step of setups and seconds per evaluation of the forces on all wheels, in every round."""
+    """Measured times (s) of every round: per step for each set-up, and per evaluation of the forces on all wheels."""
 
     def __init__(self, setups: list[Setup], rounds: int) -> None:
         self.setups = setups
@@ -126,7 +126,8 @@ class Prices:
         self._calls = {kernel: each / calls for kernel, each, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def rounds(self, setup: Setup) -> tuple[Any, Any, Any]:
-        """Seconds of each round: of a step, of the same without contact (the engine's own), of the kernel in it."""
+        """Times (s) of each round: of a step, of a step without contact (the engine's share), and of the contact kernel
+        in a step."""
         step, bare = (
             (whole - first) / steps for whole, first, steps in (self._steps[setup], self._steps[setup.without])
         )
@@ -134,7 +135,7 @@ class Prices:
         return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.count]
 
     def point(self, setup: Setup) -> dict[str, Any]:
-        """A step and what it is made of, in seconds: engine, kernel, bridge; the share of the bridge."""
+        """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of it."""
         a, b, c = self.rounds(setup)
         step, bare, kernel = (float(np.median(part)) for part in (a, b, c))
         share = median((a - b - c) / a)
@@ -168,7 +169,7 @@ def _repeat(numbers, q, v, f, times):
 
 
 def _job(setup: Setup) -> tuple[Callable[[int], Any], int]:
-    """Function that marches some steps, and how many are to be timed."""
+    """A function that marches a number of steps, and the number of steps to time."""
     wheels = setup.wheels()
     kind = setup.bridge if setup.bridge in STEPS else "native"
     if wheels.theory == "simplified":
@@ -209,7 +210,7 @@ def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
 
 
 def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The law of the contact by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
+    """A contact law that calls the Python functions of the library: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
@@ -252,7 +253,7 @@ def _price_rows(prices: Prices) -> list[Row]:
 
 
 def _threads_row() -> Row:
-    """Two threads beside one, from ten starts."""
+    """Row: runs from ten starting states give the same bits in two threads as in one."""
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
     with installed(kernel_law(forces)):
@@ -317,7 +318,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Cost per step over the law, and shares of engine, kernel and bridge."""
+    """Plot cost per step for each law, and shares of engine, kernel and bridge."""
     if "points" not in data:
         return []
     from validation.contact.contact_bridges_figure import figure

@@ -48,7 +48,7 @@ WHY = "the same continuum problem solved on cells, extrapolated to none"
 
 
 def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
-    """C11, C22, C23, C33 (4,) by the exact theory."""
+    """Creepage coefficients C11, C22, C23, C33 (4,) by the exact theory."""
     coarse, middle, fine = (_on_grid(ratio, nu, n) for n in (cells, 2 * cells, 4 * cells))
     limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
     if ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
@@ -57,7 +57,8 @@ def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
 
 
 def _on_grid(ratio: float, nu: float, cells: int) -> Array:
-    """Creepage coefficients on a grid, from a unit of each creepage; C23 is the mean of Fy by spin and Mz by xi_y."""
+    """Creepage coefficients by the exact linear theory on a grid, from unit creepages. C23 is the mean of two values:
+    lateral force by spin and moment by lateral creepage."""
     a, b = ratio**0.5, ratio**-0.5
     more = max(1.0, max(ratio, 1.0 / ratio) / 10.0)
     columns, rows = round(cells * (more if a > b else 1.0)), round(cells * (more if b > a else 1.0))
@@ -97,7 +98,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def deviation(solved: Array) -> Array:
-    """Coefficients as the library gives them divided by those of the exact theory, minus 1, (n, 4), of rows (n, 6)."""
+    """Relative deviation (n, 4) of the library's coefficients from the exact ones. solved: rows (n, 6) of ratio,
+    Poisson's ratio and exact coefficients."""
     c = coefficients(solved[:, 0], solved[:, 1])
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / solved[:, 2:] - 1.0
 
@@ -132,7 +134,7 @@ def _worst_difference_row(name: str, off: Array, nodes: Array, where: str, bound
 
 
 def _misprint(nodes: Array) -> Row:
-    """Row: the comparison's error with the misprinted coefficient."""
+    """Row: the comparison detects a widespread misprint of C23."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINT / node[4] - 1.0)
     return behaves(
@@ -147,7 +149,8 @@ def _misprint(nodes: Array) -> Row:
 
 
 def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
-    """Error of interpolation alone: the deviation there, less the mean of that at the nodes on both sides."""
+    """Rows: error of interpolation alone. It is the deviation between two nodes of the table minus the mean deviation
+    at these nodes."""
     at_nodes = deviation(nodes).reshape(len(RATIOS), len(NUS), 4)
     count = len(RATIOS) - 1
     along_ratio = (at_nodes[1:, 1] + at_nodes[:-1, 1]) / 2.0
@@ -169,7 +172,8 @@ def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
 
 
 def _beyond_rows(beyond: Array) -> list[Row]:
-    """Slender patches; C33 of long ones is what is left of large parts, and has nodes of its own at 20 and 50."""
+    """Rows on slender contact patches beyond the table. C33 of patches that are long in the rolling direction has nodes
+    of its own at ratios 20 and 50, because it is a small difference of large terms."""
     off = np.abs(deviation(beyond))
     long = beyond[:, 0] > 1.0
     asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
@@ -194,7 +198,7 @@ def _beyond_rows(beyond: Array) -> list[Row]:
 
 
 def _span(rows: Array) -> str:
-    """The ratios of some rows."""
+    """Text with the axis ratios of some rows."""
     return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(rows[:, 0]))
 
 
@@ -214,7 +218,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Coefficients over the ratio of axes, and how far the library is from the exact theory."""
+    """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))

@@ -65,7 +65,8 @@ def _row(name: str, words: str, value: float, bound: float, why: str, unit: str 
 
 
 def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
-    """The normal problem of an ellipse a/b = ratio on cells, and its errors of approach, peak and area (3,)."""
+    """Numerical solution of the normal problem for a Hertzian ellipse with a/b = ratio, and its relative errors (3,) of
+    approach, peak pressure and area."""
     a, b = SIZE * ratio**0.5, SIZE / ratio**0.5
     truth = by_axes(a, b, PAIR, load=LOAD)
     dx, dy = 2 * a / cells, 2 * b / cells
@@ -76,7 +77,7 @@ def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
 
 
 def _hertz_rows() -> list[Row]:
-    """Approach, greatest pressure and area on odd numbers of cells, so that one lies in the middle."""
+    """Rows: approach, peak pressure and area on odd numbers of cells, for which one cell lies in the centre."""
     rows = []
     for ratio in (1.0, 3.0):
         (coarse, wide), (fine, narrow) = (pressed_by_hertz(ratio, cells) for cells in (21, 63))
@@ -105,7 +106,8 @@ def _hertz_rows() -> list[Row]:
 
 
 def carter(x: Array, a: float, share: float) -> Array:
-    """Traction by mu p0 on a strip -a < x < a that rolls to +x, at a creepage of ``share`` of that of full sliding.
+    """Traction divided by mu p0 on a strip -a < x < a that rolls in the direction +x. share: ratio of the creepage to
+    the creepage of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
     zone that sticks, a (1 - share) wide each way, at the leading edge.
@@ -116,8 +118,8 @@ def carter(x: Array, a: float, share: float) -> Array:
 
 
 def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
-    """x/a, traction by mu p0 in the middle of a slender ellipse, and the error of its sum divided by that of full
-    sliding."""
+    """For the middle line of a slender ellipse: x/a, traction divided by mu p0, and error of the integrated traction
+    relative to full sliding."""
     b = SIZE / STRIP**0.5
     a = STRIP * b
     pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
@@ -143,7 +145,8 @@ def _strip_rows(cells: int) -> list[Row]:
 
 
 def shift(share: float, nu: float, cells: int) -> RollingSolution:
-    """A ball shifted so far that, by Cattaneo and Mindlin, the force is ``share`` of mu N."""
+    """Exact solution for a ball that is shifted by the distance at which the tangential force is ``share`` of mu N, by
+    Cattaneo and Mindlin."""
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
     way = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
@@ -165,7 +168,8 @@ def _shift_rows() -> list[Row]:
 
 
 def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Array:
-    """fx, fy divided by mu N and mz divided by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
+    """Forces (3,) of one of CASES: fx and fy divided by mu N, mz divided by mu N sqrt(ab). The creepages may be
+    reversed (``sign``) or mirrored in y."""
     ratio, xi_x, xi_y, spin = CASES[name]
     creepage = LIMIT / (PAIR.G * SIZE**2) * sign
     pressed = hertzian(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, cells)
@@ -175,7 +179,7 @@ def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Arr
 
 
 def _sliding_rows() -> list[Row]:
-    """Creepages at which nothing sticks."""
+    """Rows on creepages that are so large that the whole patch slides."""
     pressed = hertzian(SIZE, SIZE, LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
@@ -199,7 +203,8 @@ def _sliding_rows() -> list[Row]:
 
 
 def _symmetry_rows() -> list[Row]:
-    """Two runs that must agree but for what the residual leaves."""
+    """Rows: reversed and mirrored creepages must give reversed and mirrored forces, apart from the solver's
+    residual."""
     name, cells = "x, y against spin", 20
     there, back, mirror = roll(name, cells), roll(name, cells, -1.0), roll(name, cells, 1.0, -1.0)
     return [
@@ -215,7 +220,8 @@ def _symmetry_rows() -> list[Row]:
 
 
 def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
-    """Rows: error against the limit of infinitely small cells, from the two finest grids at order 1."""
+    """Rows: error relative to the limit of infinitely small cells, which is extrapolated from the two finest grids at
+    order 1."""
     rows = []
     for name, values in refined.items():
         left = 2.0 * np.linalg.norm(np.diff(np.array(values)[:, 1:3], axis=0), axis=1)
@@ -247,7 +253,8 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
 
 
 def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
-    """A contact of a/b 0.2 to 5 and Poisson's ratio 0 to 0.5 with spin, without its forces, and 60 to 120 cells."""
+    """A random contact with spin, a/b from 0.2 to 5 and Poisson's ratio from 0 to 0.5, with no forces computed; and 60
+    to 120 cells."""
     ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
     body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
     x, y, spin = (float(part) for part in rng.normal(size=3))
@@ -276,7 +283,8 @@ def _converged_row() -> Row:
 
 
 def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
-    """Every row of the other program's sample that this folder of data holds, and the worst difference."""
+    """Comparison with every row of another program's sample, if the folder of data has it, and the largest
+    difference."""
     words = "largest difference from the forces of CONTACT's sample (40 cells, error 0.6 %) over mu N"
     folder = data_folder()
     if folder is None or not (folder / SAMPLE).is_file():
@@ -299,8 +307,8 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
 
 
 def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
-    """Kind, a/b, difference of the force divided by mu N and of the moment divided by mu N sqrt(ab); the file is in mm,
-    N and MPa."""
+    """Kind, a/b, difference of the force divided by mu N, and of the moment divided by mu N sqrt(ab), for a row of the
+    file. The file's units are mm, N and MPa."""
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)

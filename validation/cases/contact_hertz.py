@@ -50,7 +50,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def ellipse(ratio: float) -> dict[str, Decimal]:
-    """Curvatures, load and approach of a contact whose short semi-axis is ``ratio`` times the long one."""
+    """Exact curvatures, load and approach (many digits) of a contact with a ratio of short to long semi-axis."""
     with localcontext(prec=DIGITS):
         g, modulus = Decimal(ratio), Decimal(PAIR.modulus)
         k, e = _complete(g)
@@ -90,7 +90,8 @@ def _pi() -> Decimal:
 
 
 def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
-    """Worst relative error of every quantity at each ratio, along x and along y, by load and by approach."""
+    """Largest relative error of every quantity at each axis ratio; the contacts are computed from load and from
+    approach, with the long axis along x and along y."""
     truth = [ellipse(g) for g in ratios]
     flat, steep, load, approach = (
         np.array([float(each[name]) for each in truth]) for name in ("flat", "steep", "load", "approach")
@@ -117,7 +118,7 @@ def _exchange_axes(touching: Hertz) -> Hertz:
 
 
 def _published() -> list[Row]:
-    """A contact that another program computed on a grid, and scaling."""
+    """Rows: comparison with a contact computed by another program on a grid, and scaling of the axes with the load."""
     touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, MaterialPair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
@@ -146,7 +147,7 @@ def _published() -> list[Row]:
 
 
 def _behaviour() -> list[Row]:
-    """Zero and negative load, and what is no Hertzian contact."""
+    """Rows: zero and negative loads give zero, and input that is no Hertzian contact is refused."""
     nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
     exact = all(value == 0.0 for each in nothing for value in (each.a, each.b, each.p0, each.approach, each.load))
     why = "a silent number would be wrong"
@@ -211,7 +212,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Axes over the ratio of curvatures, and the error over the ratio of axes."""
+    """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))

@@ -67,7 +67,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """The kept forces against those that the exact theory gives now."""
+    """Row: stored exact forces compared with those that the exact theory gives now."""
     known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
     answers = []
     for key in REPEATED[:2] if quick else REPEATED:
@@ -85,7 +85,8 @@ def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
 
 
 def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """Stated errors on the contacts of the set, and on drawn ones that the bands have never seen."""
+    """Rows: share of contacts whose error exceeds the stated error band. The contacts are those of the calibration set
+    and randomly drawn ones."""
     unseen, rows = read_drawn(JUDGED), []
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM, "simplified"]:
@@ -113,7 +114,8 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
 
 
 def _total_rows(cases: list[ContactCase]) -> list[Row]:
-    """Rows: stated errors of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
+    """Rows: share of random contacts whose error exceeds the stated total error of cells and theory, at 21 cells, for
+    every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
         contact = case.contact(Fastsim, **BEST_CHOICES)
@@ -137,7 +139,7 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
 
 
 def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list[ContactCase]) -> list[Row]:
-    """Error of FASTSIM's moment against the exact theory."""
+    """Rows: error of FASTSIM's moment relative to the exact theory."""
     rows = []
     range_of_set = [case for case in wide if RATIOS[0] <= case.a / case.b <= RATIOS[-1]]
     sets = {
@@ -166,7 +168,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list
 
 
 def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
-    """The errors that the cells are said to leave, against those found on many cells."""
+    """Rows: share of contacts whose discretisation error, found with many cells, exceeds the stated one."""
     rows, some = [], cases[::9] if quick else cases
     for choices, cells in product(JUDGED_CHOICES[: 1 if quick else None], (21,) if quick else NETS):
         share = _shares_beyond_stated(some, cells, choices)
@@ -187,7 +189,7 @@ def _cell_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
 
 
 def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[str, str]) -> list[float]:
-    """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
+    """Shares of contacts whose discretisation errors of force and of moment exceed the stated ones."""
     answers = []
     for case in cases:
         contact = case.contact(Fastsim, **{**BEST_CHOICES, **choices})
@@ -212,7 +214,7 @@ def _program_rows(answers: dict[str, Any]) -> list[Row]:
 
 
 def _table_row(folder: Path) -> Row:
-    """Time of a long table of contacts."""
+    """Row: computing time of a long table of contacts."""
     rng = np.random.default_rng(SEED)
     low, high = np.array([2.0, 2.0, 1.0, 0.1, -0.5, -0.5, -1.0]), np.array([9.0, 9.0, 150.0, 0.5, 0.5, 0.5, 1.0])
     path, out = folder / "contact_cases.csv", folder / "contact_forces.csv"
@@ -242,5 +244,5 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """None: what accuracy costs in contact is drawn beside the other problems of ``price``."""
+    """No figure, since the cost of accuracy in contact is drawn with the other problems of ``price``."""
     return []

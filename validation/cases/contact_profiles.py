@@ -51,7 +51,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _right_wheel_contact(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
-    """Contact of the right wheel at a shift (mm) and yaw (rad): places, load and peak pressure."""
+    """Contact of the right wheel at a lateral shift (mm) and yaw (rad): contact points, their loads, and peak
+    pressure."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=shift * 1e-3, yaw=yaw)
     pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)
     loads = {id(part.patch): part.load for part in pressed.patches}
@@ -72,7 +73,8 @@ def _right_wheel_contact(shift: float, yaw: float, exact: bool) -> dict[str, Any
 
 
 def _exact_peak(patch: Any, load: float, box: tuple[float, float, float, float]) -> float | None:
-    """Peak pressure (MPa) of the exact contact of one patch under its load, None where it grows into its neighbour."""
+    """Peak pressure (MPa) of one contact patch under its load, by the exact theory; None where the patch merges with
+    its neighbour."""
     x0, x1, y0, y1 = box
     distance = patch.distance
     wide, high = 0.15 * (x1 - x0), 0.3 * (y1 - y0)
@@ -111,14 +113,16 @@ def _file_rows() -> list[Row]:
 
 
 def wheel_off(wheel: ContactProfile) -> float:
-    """Largest difference in height (m) where both are known."""
+    """Largest difference in height (m) between the built-in S1002 profile and a file's wheel profile, where both
+    exist."""
     rail_profile = s1002()
     inside = (wheel.y >= rail_profile.y[0]) & (wheel.y <= rail_profile.y[-1])
     return float(np.abs(rail_profile.curve(wheel.y[inside]) - wheel.z[inside]).max())
 
 
 def rail_off(rail: ContactProfile) -> float:
-    """Largest distance (m) of the file's points from the inclined rail, after the best shift: its origin is its own."""
+    """Largest distance (m) of a file's rail profile from the built-in inclined rail. The file has another origin, so
+    the best shift is applied first."""
     laid = uic60().turned(Track().inclination)
     tree = KDTree(np.column_stack([laid.y, laid.z]))
     points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
@@ -131,7 +135,7 @@ def rail_off(rail: ContactProfile) -> float:
 
 
 def _main(case: dict[str, Any]) -> dict[str, float]:
-    """The contact patch with the largest normal force."""
+    """The contact point with the largest normal force."""
     return max(case["places"], key=lambda place: place["load"])
 
 
@@ -238,7 +242,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Place of contact and its load over the shift."""
+    """Plot position and load of the contact points over the lateral shift."""
     from models.drawing.figures import heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))

@@ -71,7 +71,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
-    """Errors of approach, area and peak on Hertz's ellipse, as shares."""
+    """Relative errors of approach, area and peak pressure on Hertz's ellipse."""
     exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
     a, b = float(exact.a), float(exact.b)
     contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
@@ -84,7 +84,8 @@ def _errors(contact: NormalContact, approach: float, area: float, peak: float) -
 
 
 def largest_jump(patch: Patch, steps: int) -> float:
-    """Largest jump (N) of N(a_3): every step of a sweep is halved, towards the larger change, down to rounding."""
+    """Largest jump (N) of the load as a function of depth. Each step of a sweep is bisected towards the larger change
+    until rounding."""
 
     def load(depth: float) -> float:
         return load_at_depth(patch, depth, PAIR).load
@@ -93,7 +94,7 @@ def largest_jump(patch: Patch, steps: int) -> float:
 
 
 def _jump(load: Callable[[float], float], low: float, high: float) -> float:
-    """Jump of the load between two depths that are as near as floating point allows."""
+    """Jump (N) of the load, found by bisection, between two depths that are adjacent floating-point numbers."""
     at_low, at_high = load(low), load(high)
     while high - low > 1e-15 * high:
         middle = 0.5 * (low + high)
@@ -106,7 +107,8 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _against_exact(shape: Shape) -> dict[str, Any]:
-    """Errors of every way, in shares of the exact figure and forces in % of mu N, and the exact figures."""
+    """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
+    forces are in % of mu N."""
     contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
     normal = exact_normal(shape, EXACT_CELLS, shape.box or _box_around(contacts["elliptic"]))
     motions = creepages(normal.area, shape.load)
@@ -125,7 +127,7 @@ def _against_exact(shape: Shape) -> dict[str, Any]:
 
 
 def _approach_of(shape: Shape) -> dict[str, float]:
-    """Errors of the approach with a net for each patch and with one for all, as shares."""
+    """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
     exact = exact_normal(shape, EXACT_CELLS, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
         name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
@@ -134,7 +136,8 @@ def _approach_of(shape: Shape) -> dict[str, float]:
 
 
 def _errors_on_rails() -> dict[str, dict[str, float]]:
-    """Errors of wheels on rails, which have no common net, by the ways of fitting."""
+    """Relative errors of the approach of wheels on rails, whose patches have each a grid of its own; NaN for one common
+    grid."""
     errors = {}
     for position in placed():
         pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
@@ -147,7 +150,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
 
 
 def _box_around(normal_contact: NormalContact) -> Box:
-    """The contact's box with a fifth more on every side."""
+    """Box around all patches of a contact, enlarged by a fifth of its size on every side."""
     x0, x1, y0, y1 = np.array([part.box for part in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
     wide, high = 0.2 * (high_x - low_x), 0.2 * (high_y - low_y)
@@ -155,7 +158,7 @@ def _box_around(normal_contact: NormalContact) -> Box:
 
 
 def _times() -> dict[str, list[float]]:
-    """Seconds of evaluations of both programs at about 45 x 45 cells."""
+    """Computing times (s) of the functions of both theories at about 45 x 45 cells."""
     hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
@@ -232,7 +235,7 @@ def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
 
 
 def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
-    """Areas that have grown together and wheels on rails: the worst of each."""
+    """Rows: largest error of the approach among contact areas that have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
     for place, what, chosen in kinds:
@@ -366,7 +369,7 @@ def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Errors of the two pressure profiles by shape."""
+    """Plot the errors of the two pressure profiles for each shape."""
     if "shapes" not in data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots

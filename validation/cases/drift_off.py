@@ -39,7 +39,8 @@ SPEEDS = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
 
 @dataclass(frozen=True)
 class Combination:
-    """source : noise, interpolation or model; road : of the effect; rate : Hz; size : N of the noise."""
+    """One combination to compare. source : cause of the error: noise, interpolation or model; road : settings of the
+    road effect; rate : sampling rate (Hz); size : noise (N)."""
 
     name: str
     source: str
@@ -79,7 +80,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
-    """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
+    """Predicted and measured drift-off times of all members of a combination; infinite for members that never drift
+    off."""
     members = {"noise": _noise, "interpolation": _run_neighbours, "model": _models}[combination.source]
     predicted, measured = members(combination, folder, QUICK_PATHS if quick else PATHS)
     late = [np.inf if time is None else time for time in predicted]
@@ -104,7 +106,7 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
 
 
 def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """One prediction, and the drift-off time of every path."""
+    """One predicted drift-off time, and the drift-off time of every noise path."""
     true = drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
     effects = {"force_noise": {"deviation": combination.size, "seed": SEED}}
     scene = force_scene(folder, duration=combination.duration, effects=effects)
@@ -114,7 +116,7 @@ def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[flo
 
 
 def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """Neighbouring speeds, or seeds, each predicted and run."""
+    """Predicted and measured drift-off times on roads that are similar: with other speeds, or with other seeds."""
     speed = combination.road["speed"]
     roads = [
         combination.road | ({"seed": i} if combination.road["source"] == "iso8608" else {"speed": speed * factor})
@@ -132,7 +134,7 @@ def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple
 
 
 def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
-    """Random models, each predicted and run from the true start."""
+    """Predicted and measured drift-off times of vehicles with random parameters, all started from the true state."""
     true = drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
     assembly = assemble(force_scene(folder, step=STEP, duration=combination.duration))
     p, others = assembly.parameters, list[Parameters]()
@@ -146,7 +148,7 @@ def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[fl
 
 
 def _drift_off(assembly: Assembly, true: Result) -> float:
-    """First time (s) at which the run's pitch is ANGLE from the true one; infinite if never."""
+    """First time (s) at which the run's pitch differs from the true pitch by ANGLE; infinite if it never does."""
     run = simulate(assembly.scene, "reference", assembly=assembly)
     time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
     return np.inf if time is None else time
@@ -200,7 +202,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Measured over predicted."""
+    """Plot measured over predicted drift-off times."""
     from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, subplots
 
     figure, axis = subplots(figsize=(5.2, 4.2))

@@ -136,21 +136,22 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Saved]:
-    """Figures of the study's runs in the reference by name: of some, or of all."""
+    """Figures of the study's runs in the reference, by the run's name; for some of the runs, or for all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = followed(scene, Path(folder))
         return {name: row("reference", name, measured, simulate(scenes[name], "reference")) for name in names or scenes}
 
 
 def _at_rate(rate: float) -> dict[str, float]:
-    """Undisturbed drift-off (s) and largest enforced moment (N m) at one sampling rate, steps of 0.5 ms."""
+    """Drift-off time (s) and largest enforced moment (N m) of undisturbed runs at one sampling rate, with steps of 0.5
+    ms."""
     scene = load(SCENE, (*FORCE_NOISE_ALONE, "run.step=5e-4", f"options.sampling_rate={rate}"))
     rows = _run(scene, ("undisturbed", "guided, undisturbed"))
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
 def tables(data: Saved) -> list[Table]:
-    """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
+    """Tables of all runs of the reference, and of undisturbed runs at several sampling rates."""
     rows = tuple(
         (
             row["run"],

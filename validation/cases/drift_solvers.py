@@ -83,7 +83,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _solvers(folder: Path, solvers: Any) -> list[Saved]:
-    """Drift-off (s) by solver: undisturbed with linear and with smooth samples, and noisy with linear ones.
+    """Drift-off time (s) for each solver under three inputs: linear samples, smooth samples, and noisy linear samples.
 
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
     fixed steps.
@@ -108,7 +108,7 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
 
 
 def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Result) -> dict[str, float]:
-    """Time (s) at which the pitch is off, the run's length if never, and the error then or at the end (rad)."""
+    """Drift-off time (s) of a run (its duration if it does not drift off), and its pitch error (rad) at the end."""
     settings = Settings(method, value, DURATION)
     if method in ADAPTIVE:
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
@@ -119,7 +119,8 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
 
 
 def _smoothing(folder: Path) -> list[Saved]:
-    """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
+    """For each smoothing filter and integration scheme, on the same noise files: growth of the pitch's spread, and
+    damage of the section forces."""
     true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
     treatments = [
@@ -156,13 +157,14 @@ def _record_of_solver(
 
 
 def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
-    """States (n, 8) under these samples (n, 2), smoothed before the run."""
+    """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff`` (Hz) is
+    given."""
     forces = Sampled(_low_pass(values, cutoff), 1 / NOISY_RATE, held=False)
     return build(engine, replace(assembly, input=forces), settings).run().states
 
 
 def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
-    """Butterworth of order 4, forward and backward: no delay."""
+    """Samples after a Butterworth filter of order 4, run forward and backward so that it causes no delay."""
     if cutoff is None:
         return values
     from scipy.signal import butter, sosfiltfilt
@@ -171,7 +173,8 @@ def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
 
 
 def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, float]:
-    """Pseudo-damage of the front section force by the truth's, both components, without any noise, before drift-off."""
+    """Ratio of the pseudo-damage of the front section force to the true one, for both components, without noise and
+    before drift-off."""
     end = round(SCORED * NOISY_RATE)
     wanted = section_forces(*(true[name][::4][:end] for name in ("f3", "f4", "pitch")))
     f3, f4, _ = suspension_loads(states[:end].T, assembly.parameters, "exact")
@@ -180,7 +183,8 @@ def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, flo
 
 
 def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
-    """Standard deviation (2,) in rad at WINDOW by the closed law, from the smoothed forces (n, 2) alone."""
+    """Standard deviation (2,) of the pitch in rad at the times WINDOW by the closed law, computed from the smoothed
+    forces (n, 2)."""
     p, period = assembly.parameters, 1 / NOISY_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
     at = np.rint(np.array(WINDOW) / period).astype(int)
@@ -188,7 +192,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:
-    """Who drifts off when."""
+    """Rows on the drift-off times of the solvers."""
     rows = []
     for name in ("linear", "noisy"):
         of_input = [each for each in solvers if each["input"] == name]
@@ -226,7 +230,7 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
 
 
 def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
-    """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
+    """Rows: with every smoothing or scheme, the spread of the pitch grows by the closed law of the smoothed forces."""
     rows = []
     for each in smoothing:
         key = each["name"].replace(" ", "-").replace(",", "")

@@ -66,14 +66,15 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def hand_built(engine: str, bare: Scene) -> Any:
-    """The bare vehicle written directly for an engine."""
+    """The hand-built model of the bare vehicle in an engine."""
     assembly, settings = assemble(bare), settings_of(bare, engine)
     run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
 def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
-    """Seconds of the machinery without effects against the hand-built model, and whether they agree.
+    """Ratio of computing times between twinrig's bare model and the hand-built one, and the largest difference of their
+    states.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
@@ -119,13 +120,13 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
 
 
 def ratio_row(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
-    """A ratio of seconds with its interval."""
+    """Row with a ratio of computing times and its interval."""
     value, low, high = ratio
     return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
-    """A free wheelset with linear creep on cones, against one that was written for that alone."""
+    """Rows: a free wheelset with linear creep on cones, compared with code written for this alone."""
     gap, ratio = ratio_of_wheelsets(steps, ROUNDS[quick])
     return [
         Observed(
@@ -146,7 +147,8 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
 
 
 def _rides(quick: bool) -> list[Row]:
-    """A car with seven freedoms on a rough road, against one written for each engine, or as equations.
+    """Rows: a car with seven freedoms on a rough road, compared with a model built by hand in each engine, and with
+    hand-written equations.
 
     In MuJoCo the suspension is of site actuators, as XML has them. All forces of this car alone in one callback, by
     hand, on addresses in MuJoCo's memory, beat the general callback by an eighth.
@@ -177,7 +179,7 @@ def _rides(quick: bool) -> list[Row]:
 
 
 def _cars(steps: int, quick: bool) -> list[Row]:
-    """A car of the handling scenes that rolls freely on a flat road in MuJoCo, against one written for that alone.
+    """Rows: a car that rolls freely on a flat road in MuJoCo, compared with code written for this alone.
 
     MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
     left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
@@ -203,7 +205,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
 
 
 def _stops(quick: bool) -> list[Row]:
-    """Rows: a truck brakes in a turn on snow, by the reference and by code written for this stop alone.
+    """Rows: a truck brakes in a turn on snow, in the reference, compared with code written for this stop alone.
 
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
@@ -228,8 +230,7 @@ def _stops(quick: bool) -> list[Row]:
 
 
 def _contact(quick: bool) -> list[Row]:
-    """FASTSIM on one ellipse without spin, called from Python; its march by the least of its arithmetic is told by
-    ``fastsim.speed.plain``."""
+    """Rows: FASTSIM on one ellipse without spin, called from Python, compared with code written for this alone."""
     gap, ratio = ratio_of_contacts(ROUNDS[quick])
     return [
         Observed(
@@ -250,7 +251,7 @@ def _contact(quick: bool) -> list[Row]:
 
 
 def _choice() -> Row:
-    """Row: time of choosing the effects of a linear car, divided by the time of its full covariance."""
+    """Row: ratio of the time to choose the effects of a linear car to the time of its full covariance."""
     (ratio, low, high), told = price_of_choice()
     return Observed(
         "effect_prices.choice",
@@ -263,7 +264,7 @@ def _choice() -> Row:
 
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
-    """One line of the price list."""
+    """One line of the price list: time per step in microseconds that an effect adds in an engine, with its counts."""
     seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], rounds, 5e-3)
     added = (seconds[1] - seconds[0]) / TIMED_STEPS * 1e6
     return {
@@ -277,7 +278,7 @@ def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
 
 
 def _job(bare: Scene, engine: str) -> Any:
-    """A run with its channels, built beforehand."""
+    """A run of a scene, channels included, whose model is built already."""
     assembly = assemble(bare)
     built = build(engine, assembly, settings_of(bare, engine))
     return lambda: outputs(assembly, built.run(), built)

@@ -35,7 +35,8 @@ BEST_SETTINGS = {
 
 
 def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
-    """Write pitch and wheel forces of a manoeuvre in a car's pitch and heave range, up to 2.7 Hz.
+    """Write pitch and wheel forces of a manoeuvre with frequencies up to 2.7 Hz, the range of a car's pitch and heave
+    motion.
 
     It begins in the vehicle's own equilibrium with zero angular acceleration; ``abrupt`` begins with
     4.4 rad/s^2 at once.
@@ -62,12 +63,13 @@ def moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
 
 
 def truth(scene: Scene) -> np.ndarray:
-    """The eliminated form (eq. 39) by Runge-Kutta at a sixteenth of the sampling period."""
+    """True enforced moment (n,) in N m, from the form without multiplier (eq. 39) by Runge-Kutta with steps of a
+    sixteenth of the sampling period."""
     return moment(scene, "reference", Settings("RK4", PERIOD / 16, scene.run.duration))
 
 
 def relative(computed: np.ndarray, true: np.ndarray) -> float:
-    """Rms of the difference by the rms of the true moment."""
+    """Ratio of the rms difference to the rms of the true moment."""
     return float(np.sqrt(np.mean((computed - true) ** 2) / np.mean(true**2)))
 
 
@@ -111,7 +113,8 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
 
 
 def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
-    """The eliminated form by a solver of another family, adaptive at a tolerance of 1e-11."""
+    """Row: uncertainty of the true moment, as its difference from an adaptive solver of another family at a tolerance
+    of 1e-11."""
     other = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
     return Observed(
         "moment.reference",
@@ -123,7 +126,8 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
 
 
 def _ringing(folder: Path) -> CaseAnswer:
-    """An abrupt start: error of the multiplier over the first 0.1 s with and without consistent accelerations."""
+    """Rows and data on an abrupt start: error of the multiplier over the first 0.1 s, with and without consistent
+    initial accelerations."""
     manoeuvre(folder, "itwm_drift", abrupt=True)
     scene = force_scene(folder, step=STEP, duration=ABRUPT_START, interpolation="smooth", effects=GUIDE)
     true = truth(scene)
@@ -161,7 +165,7 @@ def _ringing(folder: Path) -> CaseAnswer:
 
 
 def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
-    """Exudyn's multiplier (n,) as it comes when nobody sets its initial accelerations."""
+    """Exudyn's multiplier (n,) when its initial accelerations are not made consistent with the constraint."""
     model: Any = build("exudyn", assemble(scene), settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
@@ -171,7 +175,8 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 
 
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
-    """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
+    """Rows and table on the paper's guided run on the study road: error of the enforced moment at each step, divided by
+    the rms of the moment."""
     drive(folder, ROUGH_FACTOR + 0.1, PERIOD, PERIOD)
     paper = perturbed(PARAMETERS)
     scene = force_scene(
@@ -215,7 +220,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Start-up ringing of the multiplier."""
+    """Plot how the multiplier rings after an abrupt start."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))

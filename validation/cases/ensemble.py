@@ -78,7 +78,7 @@ def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> 
 
 
 def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
-    """Rows of a quick report: a few paths of a second, in threads, which start at once."""
+    """Rows of the quick report: a few paths of one second, computed in threads because these start at once."""
     paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
         two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
@@ -105,7 +105,7 @@ def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
 
 
 def _same_row(id: str, title: str, first: Arrays, other_paths: Arrays) -> Row:
-    """Whether two ensembles are equal to the last bit."""
+    """Row: two ensembles are equal to the last bit."""
     count = len(other_paths["drift_off"])
     equal = all(np.array_equal(first[name][:count], other_paths[name], equal_nan=True) for name in first)
     return behaves(
@@ -135,7 +135,7 @@ def _interrupted_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
 
 
 def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
-    """Kill a run without warning once two of its blocks are there, then resume it."""
+    """Row: a run is killed after two of its blocks, then resumed, and must give the same ensemble."""
     child = get_context("spawn").Process(target=_run_slow_job, args=(job, blocks))
     child.start()
     while child.is_alive() and len(list(blocks.glob("block*.npz"))) < 2:
@@ -164,13 +164,13 @@ def _run_slow_job(job: NoisePaths, blocks: Path) -> None:
 
 
 def _in_own_process(function: Callable[..., Any], *args: Any) -> Any:
-    """Value of a function run in a separate process, so that its memory can be measured alone."""
+    """Value of a function that is run in a process of its own, so that its memory can be measured alone."""
     with processes(1) as pool:
         return pool.submit(function, *args).result()
 
 
 def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
-    """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
+    """A large ensemble with its computing time (s) and the peak memory (bytes) of this process and its workers."""
     import resource
 
     start = time.perf_counter()
@@ -254,7 +254,8 @@ def _scale_rows(large: Saved) -> list[Row]:
 def _engines(
     scene: Scene, truth: np.ndarray, times: np.ndarray, ensemble: Arrays, count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
-    """The first paths in both engines: rows of agreement, and seconds per path and step of each way."""
+    """Rows on how well the first paths agree between engines, and the time (s) per path and step for each way of
+    computing."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
     single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
     ways: dict[str, Callable[[], Arrays]] = {
@@ -296,7 +297,7 @@ def _slug(label: str) -> str:
 
 
 def _half_step_row(forces: Path) -> Row:
-    """Noise belongs to the samples: half the step changes nothing but the integrator's error."""
+    """Row: with half the step the noise samples are the same, so only the integrator's error changes."""
     pitch = [
         run_paths(noise_paths(_scene(forces, 10.0, step=step), np.array([10.0])), 100)["states"][:, 0, 3]
         for step in (STEP, STEP / 2)

@@ -76,8 +76,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
-    """Contacts of every ratio, kind and level of creepage, divided by mu N / (G c^2 C) with C11, C22 and C23 c, as
-    columns."""
+    """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
+    where C is C11, C22 or C23 c."""
     ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
     part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
     known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
@@ -102,7 +102,7 @@ def _vector(columns: Contacts, **options: Any) -> Array:
 
 
 def _discretisation() -> tuple[list[Row], dict[str, Any]]:
-    """Largest error of every net, and the order between the second and the last."""
+    """Rows and data on the discretisation: mean and largest error on every grid, and order of convergence."""
     columns = creepages(tuple(KINDS), LEVELS)
     rows: list[Row] = []
     data: dict[str, Any] = {}
@@ -178,7 +178,7 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
 
 
 def _limits() -> list[Row]:
-    """Small creepages against the linear theory, and the direction of full sliding."""
+    """Rows: agreement with the linear theory at small creepages, and direction of the force in full sliding."""
     columns = creepages(("x", "y", "spin"), (1e-6,))
     answers = fastsim(RollingEllipse(**columns), PAIR)
     linear = np.stack(
@@ -217,7 +217,8 @@ def _limits() -> list[Row]:
 
 
 def _spun() -> list[Row]:
-    """Moment of full sliding under spin alone, on 21 cells, against the integral of mu times Hertz's pressure."""
+    """Rows: moment in full sliding under spin alone, on 21 cells, compared with the integral of mu times Hertz's
+    pressure."""
     ratio = np.array(ELLIPSES)
     a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
     longer, shorter = np.maximum(a, b), np.minimum(a, b)
@@ -244,7 +245,7 @@ def _spun() -> list[Row]:
 
 
 def _derivatives() -> list[Row]:
-    """Analytic derivatives against central differences of the forces."""
+    """Rows: analytic derivatives of the forces compared with central differences."""
     columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
     known, off = derivatives(RollingEllipse(**columns), PAIR), []
@@ -269,7 +270,8 @@ def _derivatives() -> list[Row]:
 
 
 def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
-    """Forces and moments (n, 3) with one value changed; a load that grows takes the ellipse with it."""
+    """Forces and moments (n, 3) with one input changed by ``step``. If the load changes, the ellipse changes with
+    it."""
     moved = {**columns, name: columns[name] + step}
     if name == "load":
         grown = np.cbrt(moved["load"] / columns["load"])
@@ -279,7 +281,7 @@ def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
 
 
 def _errors_on_random_contacts() -> list[Row]:
-    """Error of the model on contacts drawn at random, on which nothing was calibrated."""
+    """Rows: error of the model on random contacts that were not used to calibrate it."""
     error = theory_errors("blended intermediate", read_drawn(JUDGED)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
     return [
@@ -295,7 +297,8 @@ def _errors_on_random_contacts() -> list[Row]:
 
 
 def _model() -> tuple[list[Row], list[list[Any]]]:
-    """Error of the model at a converged grid against the exact theory, by every bound and kind of flexibility."""
+    """Error of the model relative to the exact theory on a converged grid, for every traction bound and kind of
+    flexibility: rows and table."""
     table, known = list[list[Any]](), read_contacts()
     for bound in POWERS:
         for kind in KINDS_OF_FLEXIBILITY:
@@ -349,7 +352,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Largest error over the cells."""
+    """Plot the largest error over the number of cells."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))

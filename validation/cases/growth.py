@@ -73,7 +73,8 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
 
 
 def _spread(true: Result, folder: Path, quick: bool) -> Saved:
-    """Standard deviations at 1 to 10 s: Monte Carlo (in the full run), covariance along the path, and the laws."""
+    """Standard deviations of pitch and heave at 1 to 10 s by three routes: Monte Carlo (full run only), covariance
+    along the path, and closed laws."""
     times, assembly = np.arange(1, LENGTH + 1), assemble(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
     p, quiet = assembly.parameters, assemble(force_scene(folder, duration=LENGTH))
@@ -105,13 +106,14 @@ def _samples(assembly: Assembly) -> Sampled:
 
 
 def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> ErrorPath:
-    """A part of a run from a sample on, beginning in the state ``start`` (8,)."""
+    """Error path over a section of a run that starts at sample ``first`` in the state ``start`` (8,)."""
     forces = replace(_samples(assembly), values=_samples(assembly).values[first : first + samples + 1])
     return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
 
 
 def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Saved:
-    """Growth rates of one road: from the run, from the forces, by cut-off, and measured in windows in both frames."""
+    """Growth rates of the error on one road, by four routes: from the run, from its forces, with other cut-offs, and
+    measured in time windows with forces in both frames."""
     true = drive(folder, WINDOW * windows, parameters=parameters, road=road)
     assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
@@ -138,7 +140,7 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str =
 
 
 def _spread_rows(spread: Saved) -> list[Row]:
-    """The spread of noise against its laws, second by second."""
+    """Rows: spread of the pitch by noise at every second, compared with its closed laws."""
     seen = "pitch" if "pitch" in spread else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
@@ -232,7 +234,8 @@ def _growth_rows(roads: Saved) -> list[Row]:
 
 
 def _body_row(key: str, title: str, road: Saved) -> Row:
-    """No growth for a vehicle that does not couple heave to pitch; one that does is told, not judged.
+    """Row: with body-fixed forces the error does not grow, if the vehicle does not couple heave to pitch. The growth of
+    a vehicle that does is reported without a verdict.
 
     Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
     of pitch beta a stiffness of 2 c g beta is left, of either sign.
@@ -246,7 +249,7 @@ def _body_row(key: str, title: str, road: Saved) -> Row:
 
 
 def _twin_row(folder: Path) -> Row:
-    """A vehicle whose ends differ: arms about the common centre of mass."""
+    """Row: the law of growth for a vehicle with unequal ends, whose lever arms count from the common centre of mass."""
     true = drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
@@ -261,7 +264,8 @@ def _twin_row(folder: Path) -> Row:
 
 
 def _engine_rows(folder: Path) -> list[Row]:
-    """Rows: paths of all implementations under one noise file, compared before the pitch error is 0.05 rad."""
+    """Rows: largest difference between the engines' paths under one noise file, until the pitch error reaches 0.05
+    rad."""
     true = drive(folder, LENGTH)
     runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
     base = runs["reference"]
@@ -284,7 +288,7 @@ def _engine_rows(folder: Path) -> list[Row]:
 
 
 def _step_row(folder: Path) -> Row:
-    """Half the step, the same noise: the difference by the spread."""
+    """Row: with half the step and the same noise, the change of the pitch divided by its spread."""
     runs = {
         step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
         for step in (5e-4, 2.5e-4)
@@ -298,7 +302,7 @@ def _step_row(folder: Path) -> Row:
 
 
 def _linear_row(folder: Path) -> Row:
-    """Linearised, measurement and all, the perturbed vehicle must not drift."""
+    """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
     true = simulate(changed(road_scene(duration=60.0), vehicle=linear), "reference")
     write_measurement(true, folder, 1 / RATE)

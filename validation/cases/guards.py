@@ -27,7 +27,7 @@ Runner = Callable[..., Any]
 
 
 def ending(attempt: Callable[[], Any]) -> str:
-    """Ending of an attempt: "refused", "raised" or "answered"."""
+    """How an attempt ends: "refused" (InputError), "raised" (RunFailed) or "answered"."""
     try:
         attempt()
     except InputError:
@@ -38,7 +38,7 @@ def ending(attempt: Callable[[], Any]) -> str:
 
 
 def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
-    """Integrators that an engine really has."""
+    """Integrators that an engine really offers, fixed-step or adaptive."""
     return [
         name
         for name, facts in CATALOGUE[engine].items()
@@ -47,18 +47,19 @@ def integrators(engine: str, adaptive: bool | None = None) -> list[str]:
 
 
 def road() -> Assembly:
-    """The vehicle on the study road."""
+    """Assembly of the vehicle on the study road."""
     return setups.vehicle(effects={"road": {"source": "study", "speed": 20.0}})
 
 
 @cache
 def _tight_solution(duration: float) -> np.ndarray:
-    """Tight solution at every millisecond."""
+    """States at every millisecond by an integrator with tight tolerances."""
     return setups.tight_solution(road(), 1e-3, duration).states
 
 
 def unstable(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]:
-    """Every fixed-step integrator at steps of 2 to 10 ms over 40 ms, 0.2 and, in full, 2 s: how the runs end."""
+    """Numbers of runs that end right, refused, raised or silently wrong, for every fixed-step integrator at steps of 2
+    to 10 ms and several durations (0.04 and 0.2 s; in full also 2 s)."""
     counts = {"right": 0, "refused": 0, "raised": 0, "SILENT": 0}
     for name in integrators(engine, adaptive=False):
         for step in QUICK_STEPS if quick else STEPS:
@@ -80,7 +81,8 @@ def _word(engine: str, name: str, step: float, duration: float, runner: Runner) 
 
 
 def not_a_number(engine: str) -> dict[str, str]:
-    """A NaN in the force samples given past the file reader, every integrator, held and linear."""
+    """How runs end if a force sample is NaN, passed around the file reader, for every integrator and both
+    interpolations."""
     base, endings = setups.vehicle(), {}
     for name in integrators(engine):
         for held in (True, False):
@@ -92,14 +94,14 @@ def not_a_number(engine: str) -> dict[str, str]:
 
 
 def constrained(engine: str) -> dict[str, str]:
-    """A prescribed pitch in every integrator that cannot solve for it."""
+    """How runs with a prescribed pitch end in each integrator that cannot solve constraints."""
     wrong = [name for name in integrators(engine) if not CATALOGUE[engine][name].constraints]
     return {name: ending(partial(setups.run, engine, prescribed_pitch.scene(), 1e-3, 0.5, name)) for name in wrong}
 
 
 def constrained_unchecked() -> dict[str, str]:
-    """Endings of constrained runs without the check, by Exudyn's explicit integrators: the multiplier is compared with
-    the balance."""
+    """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
+    The guard after the run compares the multiplier with the balance of moments."""
     names = [name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED.values()]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
     scene = prescribed_pitch.scene()
@@ -107,7 +109,7 @@ def constrained_unchecked() -> dict[str, str]:
 
 
 def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
-    """The expected word if all runs ended so, else the ones that did not."""
+    """The expected word if all runs ended in this way; else a list of the runs that did not."""
     other = [f"{name}: {ended}" for name, ended in endings.items() if ended != expected]
     return "; ".join(other) or expected
 
@@ -170,7 +172,8 @@ def _disk_row(folder: Path) -> Row:
 
 
 def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
-    """No silent answer with the check; past it, long runs are caught by the guard after the run."""
+    """Rows: no run at an unstable step gives a silent wrong answer; if the check before it is bypassed, the guard after
+    it raises an error."""
     checked = unstable(engine, setups.run, quick)
     past = unstable(engine, setups.unchecked, quick)
     endings[engine] = {"checked": checked, "unchecked": past}
@@ -236,7 +239,8 @@ def _input_rows(engine: str) -> list[Row]:
 
 
 def _reduced_row(engine: str) -> Row:
-    """Reference and MuJoCo have no constraint in the model: an explicit solver is right there."""
+    """Row: in the reference and MuJoCo the pitch is an input and no constraint, so that an explicit solver gives the
+    right enforced moment."""
     error = prescribed_pitch.explicit(engine, Path())
     return Observed(
         f"guards.constraint.{engine}",

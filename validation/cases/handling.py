@@ -63,7 +63,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _gap(a: Drive, b: Drive) -> float:
-    """Largest difference of positions and rates."""
+    """Largest difference of coordinates and rates between two drives."""
     return float(max(np.abs(a.run.positions - b.run.positions).max(), np.abs(a.run.rates - b.run.rates).max()))
 
 
@@ -78,8 +78,8 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
 
 
 def locked_error() -> float:
-    """Largest error, divided by mu N, of the force on wheels that do not turn, from one that opposes sliding with mu
-    N."""
+    """Largest error of the force on wheels that do not turn, divided by mu N; the exact force has the size mu N and
+    opposes the sliding."""
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
     slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()
@@ -118,7 +118,7 @@ def _power_row(drive: Drive) -> Row:
 
 
 def mirror_gap(handling: Handling, duration: float) -> float:
-    """Largest difference between a step of steering to the left and the mirror image of one to the right."""
+    """Largest difference between a steer step to the left and the mirror image of a steer step to the right."""
     left, right = (
         drive_run(
             "mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration
@@ -140,7 +140,8 @@ def _mirror_row(duration: float) -> Row:
 
 
 def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 20.0) -> float:
-    """Yaw gain of a steady turn of small slip, by the closed form, less 1; ``change`` plants a fault in the table."""
+    """Relative error of the yaw gain in a steady turn with small slip, compared with the closed form; change: plants a
+    fault in the table."""
     steer = 2e-5
     handling = Handling(NO_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
     gain = steady_turn(handling, speed).yaw_gain
@@ -191,7 +192,7 @@ def _stop_rows() -> list[Row]:
 
 
 def _transfer_rows() -> list[Row]:
-    """Rows: load transfer of the car and of a box on four springs, against the balance of all their bodies."""
+    """Rows: load transfer of the car, and of a box on four springs, compared with the balance of all bodies."""
     rows = []
     for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
         braking = braked_error(drive_run("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
@@ -262,14 +263,14 @@ def _energy_rows() -> list[Row]:
 
 
 def _swap_axles(handling: Handling) -> None:
-    """Bristles of the rear in front, and the other way round."""
+    """Plant a fault: the bristle stiffnesses of front and rear tyres are exchanged."""
     for front, rear in ((0, 2), (1, 3)):
         ahead, behind = handling.tyre_numbers(front), handling.tyre_numbers(rear)
         ahead[at.BRISTLES], behind[at.BRISTLES] = float(behind[at.BRISTLES]), float(ahead[at.BRISTLES])
 
 
 def _turn_wrong(handling: Handling) -> None:
-    """Plant a fault: one front wheel is steered the other way."""
+    """Plant a fault: one front wheel is steered in the opposite direction."""
     handling.tyre_numbers(1)[at.STEERED] *= -1.0
 
 
@@ -316,7 +317,7 @@ def _price_row() -> Row:
 
 
 def _threads_row() -> Row:
-    """Lane changes at three speeds, together in MuJoCo's loop."""
+    """Row: lane changes at three speeds give the same bits in two threads of MuJoCo as in one."""
     handling = lane_change()
     built = FreeMujoco(driven_by(handling))
     built.model.opt.timestep = 1e-3
@@ -336,7 +337,7 @@ def _threads_row() -> Row:
 
 
 def _march(handling: Handling, steps: int) -> Callable[[], Any]:
-    """Steps of MuJoCo's own loop, and nothing else."""
+    """A job of some steps in MuJoCo's own loop, without preparation or channels."""
     built = FreeMujoco(driven_by(handling))
     built.model.opt.timestep = 1e-4
     start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
@@ -349,7 +350,7 @@ def _march(handling: Handling, steps: int) -> Callable[[], Any]:
 
 
 def _repeat_tyres(times: int) -> None:
-    """Four tyres that roll with a little slip."""
+    """Evaluate the forces of four slightly slipping tyres a number of times."""
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9

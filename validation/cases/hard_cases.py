@@ -71,7 +71,7 @@ def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
 
 
 def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
-    """The error where an answer is wanted and given, the behaviour otherwise."""
+    """Row of a hard case: its error where an answer is expected and given, else how it behaved."""
     id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
     quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
@@ -86,7 +86,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def _catalogue(data: Saved) -> Table:
-    """Table of the cases that stand for each number of the catalogue."""
+    """Table of the catalogue's failure classes with the cases that belong to each."""
     words = {name: ["in full"] for _, name in data["known"]}
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
     rows = tuple(
@@ -104,7 +104,7 @@ def _catalogue(data: Saved) -> Table:
 
 
 def _counts_by_family(data: Saved) -> Table:
-    """Cases, those that were run and their outcomes, of every family and of all of them."""
+    """Table with the number of cases, of cases that were run, and of their outcomes, for every family and for all."""
     known = Counter(family for family, _ in data["known"])
     groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
     groups["all"] = data["cases"]
@@ -126,7 +126,7 @@ def _counts_by_family(data: Saved) -> Table:
 
 
 def _table_of_cases(entries: list[Saved]) -> Table:
-    """Every case: what is hard, what it is checked against, and what each implementation makes of it."""
+    """Table of all cases: what is hard, what it is checked against, and the outcome in each implementation."""
     rows = tuple(
         (
             entry["name"],

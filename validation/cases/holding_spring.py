@@ -40,7 +40,8 @@ HALVINGS = 7
 
 @dataclass(frozen=True)
 class Setting:
-    """damping : by critical damping of the spring on I + J; disturbed : by noise and the perturbed model."""
+    """One setting of the holding spring. damping : ratio to the spring's critical damping with the inertia I + J;
+    disturbed : whether there is noise and a perturbed model."""
 
     damping: float
     disturbed: bool
@@ -55,7 +56,7 @@ TOLD_SETTINGS = (Setting(1.0, False), Setting(0.0, True))
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """The true pitch (n,), and the runs without a spring that start where the true one does, by ``disturbed``."""
+    """True pitch (n,), and for each value of ``disturbed`` a run without the spring that starts in the true state."""
 
     pitch: np.ndarray
     runs: dict[bool, Assembly]
@@ -90,7 +91,7 @@ def _measure(folder: Path) -> FreeRuns:
 
 
 def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str = "reference") -> float:
-    """Largest pitch error (rad) of a run on a spring (N m/rad)."""
+    """Largest pitch error (rad) of a run with a holding spring of a stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
@@ -98,7 +99,7 @@ def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str 
 
 
 def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[Row]:
-    """Too soft a spring fails and a little more than the law holds."""
+    """Rows: a spring of 0.6 of the predicted stiffness fails to hold the pitch, and one of 1.2 holds it."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
         off = _error(setting, factor * free_runs.predicted_stiffness, free_runs, engine)
@@ -118,7 +119,7 @@ def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[
 
 
 def _smallest(setting: Setting, free_runs: FreeRuns) -> float:
-    """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
+    """Smallest stiffness (N m/rad) that holds the pitch, by bisection; NaN if even the upper end of the range fails."""
     low, high = 0.5 * free_runs.predicted_stiffness, 1.3 * free_runs.predicted_stiffness
     if _error(setting, high, free_runs) > HELD_PITCH:
         return math.nan

@@ -59,7 +59,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
-    """Engines and written-out equations at random states, and those equations against others without any force."""
+    """Rows: accelerations of the engines at random states, compared with written-out equations; and these equations,
+    without forces, compared with others."""
     worst = 0.0
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
         q, v = anywhere(vehicle, i)
@@ -95,7 +96,8 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
 
 
 def _wrenches(vehicle: CutVehicle) -> Row:
-    """Joint forces of the hubs' wrenches by the kernel and by MuJoCo's own Jacobians."""
+    """Row: generalised forces of the hub wrenches by the compiled kernel, compared with those by MuJoCo's own
+    Jacobians."""
     (q, _), worst = anywhere(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
         hub_inputs = shaken(vehicle, frame, guide=False)
@@ -122,7 +124,8 @@ def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> Hu
 
 
 def _gravity(vehicle: CutVehicle) -> list[Row]:
-    """Body-fixed static forces on a tilted vehicle: it slides off, and nothing inside it feels that."""
+    """Rows: a tilted vehicle under body-fixed static forces slides sideways as a rigid body, and its section forces do
+    not change."""
     run = _tilted(vehicle, "hub", TILT, 1.0)
     fall = -0.5 * GRAVITY * np.array([np.sin(TILT), 1 - np.cos(TILT)]) * run.times[:, None] ** 2
     preloads = np.array([element.held for element in vehicle.elements])
@@ -150,7 +153,7 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
 
 
 def _toppling(vehicle: CutVehicle) -> Row:
-    """Forces that keep their directions carry the vehicle from below: it topples like a pendulum."""
+    """Row: under forces that keep their directions in space, the vehicle topples like an inverted pendulum."""
     run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
     return Observed(
@@ -164,7 +167,7 @@ def _toppling(vehicle: CutVehicle) -> Row:
 
 
 def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
-    """Free on noise in every engine."""
+    """Row: difference between free runs of all engines under the same noisy forces."""
     steps = round(duration / STEP)
     hub_inputs = static(vehicle, steps + 1)
     noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
@@ -180,13 +183,14 @@ def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
 
 
 def _rough(vehicle: CutVehicle, duration: float) -> HubInputs:
-    """A class C road at 20 m/s."""
+    """Road input of a class C road at 20 m/s."""
     left, right = (iso8608_road("C", seed) for seed in (1, 2))
     return two_tracks(vehicle, left, right, 20.0, STEP, round(duration / STEP))
 
 
 def _reproduced(vehicle: CutVehicle) -> list[Row]:
-    """Hub forces of a road without noise bring the same motion back, but for what lies between samples."""
+    """Rows: hub forces recorded on a road without noise reproduce the motion, apart from errors of interpolation
+    between samples."""
     duration = 2.0
     true = true_run("mujoco", vehicle, _rough(vehicle, duration), "hub", STEP, duration)
     off = {}
@@ -216,7 +220,8 @@ def _reproduced(vehicle: CutVehicle) -> list[Row]:
 
 
 def _growth(vehicle: CutVehicle) -> list[Row]:
-    """Mean squares of an ensemble by their laws, chi-square with as many degrees of freedom as paths."""
+    """Rows: ratios of an ensemble's mean squares to their laws. They follow a chi-square distribution with as many
+    degrees of freedom as paths."""
     steps, step = round(LASTING / 2e-3), 2e-3
     rest, deviation = static(vehicle, steps + 1), np.tile([20.0] * 3 + [4.0] * 3, len(vehicle.hubs))
     still = HubForces(rest.hubs, step, "hub")
@@ -255,7 +260,8 @@ def _scene(frame: str) -> HubScene:
 
 
 def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
-    """Compares the engines before drift-off, both angles with the filter, and the damage that each run predicts."""
+    """Rows: difference between the engines before drift-off, errors of both angles with the filter, and damage that
+    each run predicts."""
     off = np.abs(comparison.errors(comparison.runs[FILTER])).max(axis=0)
     rows = [
         Observed(
@@ -299,7 +305,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
 
 
 def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
-    """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
+    """Row: damage ratios if the true roll and pitch are prescribed, so that only the noise of the forces remains."""
     measurement = comparison.measurement
     assert measurement.truth is not None
     steps = measurement.scene.steps
@@ -318,7 +324,8 @@ def _prescribed_truth(frame: str, comparison: Comparison) -> Row:
 
 
 def _faults(scene: HubScene) -> list[Row]:
-    """A measurement in a wrong frame, or with hubs exchanged, contradicts the measured angles.
+    """Rows: hub forces in a wrong frame, or with hubs exchanged, are refused because they contradict the measured
+    angles.
 
     Over 5 s: in 2 s another frame cannot be told from an offset of 30 N at a wheel, which is no contradiction.
     """

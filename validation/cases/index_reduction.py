@@ -58,18 +58,18 @@ LACKING = (
 
 @dataclass(frozen=True)
 class Files:
-    """A drive on the study road: its true pitch, and scenes that follow its files."""
+    """A drive on the study road in a folder, with its true pitch; it makes scenes that are driven by its files."""
 
     folder: Path
     duration: float
     pitch: np.ndarray
 
     def scene(self, **effects: Any) -> Scene:
-        """The vehicle under the measured forces, linear between the samples."""
+        """Scene of the vehicle under the measured forces, which are interpolated linearly."""
         return force_scene(self.folder, step=STEP, duration=self.duration, effects=effects)
 
     def guided(self, file: str = "pitch.csv", **values: Any) -> Assembly:
-        """Guided by one of the files."""
+        """Assembly of the vehicle whose pitch is prescribed by one of the files."""
         return assemble(self.scene(prescribed_pitch={"file": file, **values}))
 
 
@@ -96,8 +96,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _drive(folder: Path, duration: float) -> Files:
-    """Run a virtual measurement on the road of the study; write its forces, its pitch, and the pitch by integration of
-    a gyro's rate."""
+    """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch that a noisy gyro's
+    integrated rate gives."""
     measured = drive(folder, duration, STEP, STEP)
     walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
@@ -105,7 +105,8 @@ def _drive(folder: Path, duration: float) -> Files:
 
 
 def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus true pitch (n,) by formulation, each from the assembly's initial state."""
+    """Difference (n,) in rad of pitch and true pitch for every constraint formulation, from the assembly's initial
+    state."""
     duration = files.duration
     paths = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
     for name, integrator in EXUDYN.items():
@@ -118,8 +119,8 @@ def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
 
 
 def _gaps(files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus prescribed pitch (n,) by formulation, from a start that is off by START_ERROR and
-    START_RATE_ERROR."""
+    """Difference (n,) in rad of pitch and prescribed pitch for every constraint formulation, if the start is wrong by
+    START_ERROR and START_RATE_ERROR."""
     guided = files.guided()
     start = guided.initial.copy()
     start[[3, 7]] += START_ERROR, START_RATE_ERROR
@@ -127,7 +128,8 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
 
 
 def _unguided_pitch_errors(files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus true pitch (n,) under noisy forces and no guidance, by the solvers of both engines."""
+    """Difference (n,) in rad of pitch and true pitch under noisy forces and without a prescribed pitch, for several
+    solvers."""
     noisy = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
@@ -142,7 +144,8 @@ def _unguided_pitch_errors(files: Files) -> dict[str, np.ndarray]:
 
 
 def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
-    """Gap (n,) in rad that a formulation must have after the wrong start, and why."""
+    """For each formulation, the closed form of the pitch error (n,) in rad after the wrong start, and the reason for
+    it."""
     times = STEP * np.arange(len(files.pitch))
     return {
         "index 1": (gap_law(times, START_ERROR, START_RATE_ERROR), "g'' = 0 keeps both errors: g = g(0) + g'(0) t"),
@@ -198,7 +201,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
 
 
 def _quadrature(files: Files) -> np.ndarray:
-    """Error (n,) in rad of the trapezoidal rule over the rate of the prescribed pitch."""
+    """Error (n,) in rad of the prescribed pitch's rate after integration by the trapezoidal rule."""
     signal = files.guided().input
     assert signal is not None
     angle, rate = signal.sample(0.0, STEP, len(files.pitch))[:, 2:4].T
@@ -232,7 +235,7 @@ def _index_two_refused() -> Row:
 
 
 def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> list[Row]:
-    """Neither drift by noise cares for the formulation."""
+    """Rows: the drift caused by noise, with and without prescribed pitch, is the same in all formulations."""
     rows = []
     guided = "guided by the integrated rate of a noisy gyro"
     free = f"without guidance, {FORCE_NOISE:g} N of noise on each sample of the forces"
@@ -327,14 +330,14 @@ class IndexOne:
         return states
 
     def _rate(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """y' (8,) under the input u = (f1, f2, beta, beta', beta'')."""
+        """Derivative y' (8,) of the state under the input u = (f1, f2, beta, beta', beta'')."""
         dy = self._free(y, u[:2].copy(), self._p)
         wanted = u[4] - 2 * self.alpha * (y[7] - u[3]) - self.alpha**2 * (y[3] - u[2])
         dy[4:] = (self._solve @ np.append(self._mass @ dy[4:], wanted))[:4]
         return dy
 
     def _back(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """The nearest state on the constraint, by the distance that kinetic energy defines."""
+        """Projection of a state onto the constraint: the nearest state by the metric of the kinetic energy."""
         along = self._solve[:4, 4]
         return y - np.concatenate((along * (y[3] - u[2]), along * (y[7] - u[3])))
 

@@ -59,7 +59,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _attitude_from_exact_rates() -> list[Row]:
-    """Attitude from exact rates: about a fixed axis in steps of any length, and on a cone at 1 kHz."""
+    """Rows: error of the attitude integrated from exact rates, about a fixed axis and about an axis that moves on a
+    cone."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
     held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
     rates, true = cone(h * np.arange(10_001))
@@ -80,12 +81,13 @@ def _attitude_from_exact_rates() -> list[Row]:
 
 
 def _closed_form_row(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
-    """Row for an error beside a closed form."""
+    """Row for an error relative to a closed form."""
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(bound, why, "closed form")
 
 
 def _one_axis(paths: int) -> list[Row]:
-    """Eqs (27) to (30): one noisy axis, no rotation; the angle is a Brownian motion about that axis."""
+    """Rows on eqs (27) to (30): with noise on one gyro axis and no rotation, the angle about this axis is a Brownian
+    motion."""
     rows = []
     for axis in range(3):
         deviation = EQUAL / PERIOD**0.5 * np.eye(3)[axis]
@@ -116,7 +118,7 @@ def _one_axis(paths: int) -> list[Row]:
 
 
 def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> Row:
-    """Row for a mean that must lie within LEVEL standard errors of its law."""
+    """Row for a mean that must lie within LEVEL standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
         law,
@@ -127,7 +129,8 @@ def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> 
 
 
 def _three_axes(paths: int) -> list[Row]:
-    """Equal noise: the trace; unequal noise on a turning body: the whole mean matrix, and the quaternion's mean."""
+    """Rows on noise about three axes: with equal noise the mean trace of the error; with unequal noise on a turning
+    body the mean error matrix and the mean quaternion."""
     count = round(SPAN / PERIOD)
     rates, root = turning(count, PERIOD), PERIOD**0.5
     equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
@@ -189,7 +192,8 @@ STRATONOVICH = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
 def _norms(paths: int) -> list[Row]:
-    """Ito: the quaternion that is never normalised grows by the law, and its mean is the true one."""
+    """Rows on Ito's theory: the norm of a quaternion that is never normalised grows by a law, and its mean is the true
+    quaternion."""
     rows, steps, span = [], 100, 4.0
     period = span / steps
     for axes in (1, 3):
@@ -236,7 +240,8 @@ def _norms(paths: int) -> list[Row]:
 
 
 def _ten_minutes(paths: int) -> CaseAnswer:
-    """The paper's example: 600 s at 1 kHz, 0.1 rad/s white on each sample, on a car's motion."""
+    """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
+    gyro sample."""
     walk = random_walk(DEVIATION, RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
@@ -293,13 +298,13 @@ def _ten_minutes(paths: int) -> CaseAnswer:
 
 
 def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Error angles (601, 3) in degrees about the global axes of one noisy path, at the times of ``true`` (601, 4)."""
+    """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true`` (601, 4)."""
     attitudes = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
     return np.degrees(logarithm(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
-    """Angle error of a bias that is drawn once and of one that wanders, by the process itself."""
+    """Rows: mean square angle error from simulated gyro biases, constant and wandering, compared with its law."""
     rows, grade, tau = [], 10.0 * DEGREES_PER_HOUR, 100.0
     for name, turn_on, instability, span in (
         ("constant", grade, 0.0, 60),
@@ -326,7 +331,7 @@ def _bias(paths: int) -> list[Row]:
 
 
 def _section_forces() -> list[Row]:
-    """A slow angle error turns the section forces and does nothing else: shown once, by guided runs."""
+    """Rows: a slowly growing pitch error only rotates the section forces, shown with runs whose pitch is prescribed."""
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
         place = Path(name)
@@ -354,7 +359,8 @@ def _section_forces() -> list[Row]:
 
 
 def _recording(paths: int) -> CaseAnswer:
-    """A minute in a real car: gyro against camera, and the noise law on its motion."""
+    """Rows and data from a minute of recording in a real car: gyro compared with camera, and the noise law on the car's
+    motion."""
     path = recording.find()
     if path is None:
         reason = f"needs {recording.FILE} in the folder that TWINRIG_DATA names"

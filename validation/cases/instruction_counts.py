@@ -80,7 +80,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _instructions(folder: Path) -> np.ndarray:
-    """Instructions (2 processes, methods, 2 numbers of steps), by the marks between the marches."""
+    """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler dumps them between the marches."""
     folder.mkdir()
     mass, damping, stiffness, *_ = linearised(assemble(road_scene()).vehicle)
     march = {
@@ -113,7 +113,7 @@ def _instructions(folder: Path) -> np.ndarray:
 
 
 def _total(dump: Path) -> int:
-    """Instructions of one dump."""
+    """Number of instructions in one dump of the profiler."""
     matched = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
     assert matched is not None
     return int(matched[1])

@@ -64,7 +64,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
-    """Mean NEES and NIS per degree of freedom; filters with a wrong noise level get a quarter of the runs."""
+    """Rows: mean NEES and NIS per degree of freedom. Filters with a wrong noise level are run in a quarter of the
+    runs."""
     by_filter: dict[str, list[Any]] = {name: [] for name in filters}
     for i in range(count):
         scales = {name: FILTERS[name] for name in filters if name == "right" or i < count // 4}
@@ -93,7 +94,7 @@ BIAS, SLUGGISH = 0.2, 0.3
 
 
 def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
-    """Right filters that are called inconsistent, and wrong ones that are not."""
+    """Rows: number of correct filters that the consistency test rejects, and of wrong filters that it accepts."""
     count = len(innovations)
     alarms = sum(not consistency(each, ("pitch",)).consistent for each in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -115,7 +116,7 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
 
 
 def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom: int) -> Row:
-    """A filter that is told a wrong variance must be found out."""
+    """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     return behaves(
@@ -130,7 +131,7 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
 
 
 def _band(freedom: int) -> tuple[float, float]:
-    """Band for the mean of a chi-square sample per degree of freedom."""
+    """Confidence band for the mean of a chi-square sample, per degree of freedom."""
     low, high = chi2.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], freedom) / freedom
     return float(low), float(high)
 
@@ -148,7 +149,7 @@ def _band_row(name: str, words: str, values: np.ndarray, freedom: int, sample: s
 
 
 def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
-    """Angle, rate and both from a file with holes."""
+    """Rows: pitch error if the file of the angle, of the rate, or of both has missing samples."""
     rows = []
     for name in sensors:
         gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
@@ -176,7 +177,8 @@ def _short_rows(folder: Path) -> list[Row]:
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
-    """Deviations of the errors of estimate and run against the discrete Lyapunov equation."""
+    """Rows and table: variances of the errors of filter estimate and run, compared with the discrete Lyapunov
+    equation."""
     force = at_period(35.0, COARSE_PERIOD)
     step, covariance = closed_loop(folder, force)
     errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
@@ -258,7 +260,8 @@ ESTIMATED = "mean share by which the estimated 1/I is above the model's"
 
 
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
-    """Moments by the inertia term: with a right model, and the part of a wrong one that is no inertia."""
+    """Rows: ratio of the filter's artificial moments to the inertia moment I beta''. With a wrong model, the share that
+    the inertia error does not explain is judged."""
     reference = [each["reference"] for each in damage]
     rows = []
     for name, words, some, key in (

@@ -64,7 +64,7 @@ def scene(
     road: bool = False,
     override: dict[str, float] | None = None,
 ) -> Scene:
-    """The half car on tyres that only push: on the study road from rest, or dropped on a flat one."""
+    """Scene of the half car on tyres that can lift off: on the study road from rest, or dropped onto a flat road."""
     return build_scene(
         {
             "title": TITLE,
@@ -77,7 +77,8 @@ def scene(
 
 
 def _accelerations(parameters: str) -> list[Row]:
-    """Both engines beside the written equations, at states that are half a metre and 3 m/s wide."""
+    """Rows: accelerations of both engines and of the written equations at random states, some of them with wheels in
+    the air."""
     rows = []
     for geometry in ("exact", "linear"):
         lifting = scene(parameters, geometry, 2.0, 1e-3, road=True)
@@ -99,7 +100,8 @@ def _accelerations(parameters: str) -> list[Row]:
 
 
 def _paths(parameters: str, duration: float) -> list[Row]:
-    """Whole paths on the study road at the same step; the least load of any of them."""
+    """Rows: difference of complete paths on the study road at the same step, and the least wheel load, which must
+    be 0."""
     lifting = scene(parameters, duration=duration, step=5e-4, road=True)
     runs = {engine: simulate(lifting, engine) for engine in IMPLEMENTATIONS}
     rows = [
@@ -136,7 +138,7 @@ def _loads(run: Result) -> np.ndarray:
     "tyres not flat",
 )
 def _bounces_by_exponentials(duration: float) -> list[Row]:
-    """Bounces on the flat road beside matrix exponentials between the switches."""
+    """Rows: bounces on a flat road, compared with matrix exponentials between the times at which tyres lift or land."""
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
@@ -165,7 +167,7 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
     "tyres not flat",
 )
 def _order(halvings: int) -> Row:
-    """Slope of the error over the step."""
+    """Row: observed order of the error in the step, for a run with landings."""
     lifting = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
     exact = Bounces(assemble(lifting), coarse).path(assemble(lifting).initial, round(1.0 / coarse))
@@ -218,7 +220,8 @@ def _energy(duration: float) -> list[Row]:
 
 @allowing("what the linear tyre does is what is shown")
 def _pulls(quick: bool) -> list[Row]:
-    """Rows: how far the paper's linear tyre pulls on the study road, and the difference that makes."""
+    """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and how this changes the wheel
+    loads."""
     lifting_scene = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
     lifting, linear = simulate(lifting_scene, "reference"), simulate(without(lifting_scene, "lift_off"), "reference")
     loads = _loads(linear)
@@ -246,8 +249,8 @@ def _pulls(quick: bool) -> list[Row]:
 
 
 def _in_space(quick: bool) -> list[Row]:
-    """Rows of R19-ride with tyres that lift off: accelerations against hand-written equations, and both engines on a
-    random road."""
+    """Rows on R19-ride with tyres that lift off: accelerations compared with hand-written equations, and both engines
+    compared on a random road."""
     ride = build_ride(
         {
             "title": TITLE,
@@ -295,7 +298,7 @@ def _in_space(quick: bool) -> list[Row]:
 
 
 def _above_a_cut() -> list[Row]:
-    """Hub forces of a car whose wheels leave a road of class E."""
+    """Rows: hub forces of a car whose wheels leave a class E road: difference between the engines, and least force."""
     car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, SPEED, 1e-3, round(duration / 1e-3))

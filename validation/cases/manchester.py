@@ -70,7 +70,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _timed_positions(case: str, shifts: np.ndarray) -> tuple[list[WheelsetPlacement], float]:
-    """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
+    """The wheelset at every lateral shift (mm), and the processor time (s) per position, because other cases run at the
+    same time."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
     placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
     return placed_run.detail.placed, placed_run.seconds / len(shifts)
@@ -112,7 +113,8 @@ def _published_rows(wheel: str, placed: list[WheelsetPlacement], published: np.n
 
 
 def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
-    """Touching places by search, and the mirror image."""
+    """Rows: first contact points compared with a search over surface points, and contact compared with its mirror
+    image."""
     contact, gaps = contact_of("A-1"), []
     for position in placed:
         for sign, places in ((1.0, position.right), (-1.0, position.left)):
@@ -151,7 +153,8 @@ def _static_rows(placed: list[WheelsetPlacement]) -> list[Row]:
 
 
 def _axle_row(placed: WheelsetPlacement) -> Row:
-    """The wheelset turns freely: in the middle of the track each wheel's reported forces have no moment about it."""
+    """Row: the axle turns freely, so that the forces of each wheel must have no moment about it in the middle of the
+    track."""
     moments = [
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
     ]
@@ -216,7 +219,8 @@ def _load_row(static: list[WheelsetPlacement]) -> Row:
 
 
 def _file_rows(placed: list[WheelsetPlacement]) -> list[Row]:
-    """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
+    """Rows: contact with the built-in profiles, compared with the benchmark's own profile files; in these the rail lies
+    inclined."""
     names = {"places": ("mm", PLACE_BOUND, 0), "forces": ("%", FORCE_BOUND, 1)}
     words = "difference between built-in profiles and the benchmark's files, case A-2"
     folder = data_folder()
@@ -256,7 +260,8 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
 
 
 def _table_of_patches(placed: WheelsetPlacement) -> dict[str, Any]:
-    """Shift (mm), and of each patch place, place on the wheel (mm), angle (deg), force (kN) and peak (MPa)."""
+    """For each shift (mm) and patch: contact position on rail and wheel (mm), angle (deg), force (kN) and peak pressure
+    (MPa)."""
     return {"shift": 1e3 * placed.shift} | {
         wheel: [
             [1e3 * p.y, 1e3 * p.wheel_centre, float(np.degrees(-p.centre_angle)), p.normal / 1e3, p.peak / 1e6]
@@ -296,7 +301,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Mean place and force of the right wheel beside CONTACT's."""
+    """Plot mean position and force of the right wheel, together with CONTACT's."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, heading, legend_below, subplots
 
     published = np.array(data["published"])

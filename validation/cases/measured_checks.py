@@ -136,13 +136,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _size(findings: Sequence[Finding], check: str, place: str = "") -> float:
-    """Size of the first finding of a check at a place; NaN where there is none."""
+    """Size that the first finding of a check states at a place; NaN if there is no such finding."""
     sizes = [finding.size for finding in findings if finding.check == check and place in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
 def _sized(key: str, quantity: str, size: float, unit: str, planted_size: float) -> Row:
-    """Row of the size of what was planted."""
+    """Row that compares a found size with the size of the planted fault."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
     return Observed(id, SYSTEM, quantity, size, unit).within(
         planted_size, SHARE * abs(planted_size), why, "closed form"
@@ -150,13 +150,13 @@ def _sized(key: str, quantity: str, size: float, unit: str, planted_size: float)
 
 
 def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> Row:
-    """Row of findings of which there must be none."""
+    """Row that passes if there are no findings."""
     id, said = f"measured_checks.{key}", "; ".join(texts) or why
     return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
 
 
 def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
-    """Named at the right place, nothing else named, and its size."""
+    """Rows on one planted fault: it is named at the right place, no other fault is named, and its size is right."""
     key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
     named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
     alone = all(finding.check == fault.check for finding in findings)
@@ -183,7 +183,8 @@ def _clean_recordings_row(name: str, recordings: list[tuple[Finding, ...]]) -> R
 
 
 def _clean_recordings(folder: Path) -> list[Row]:
-    """Four roads, two vehicles, two samples of noise each; recordings of 5 to 20 s."""
+    """Rows: no errors or doubts on clean recordings of 5 to 20 s, from four roads, two vehicles and two noise samples
+    each."""
     return [
         _clean_recordings_row(
             vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)]
@@ -193,7 +194,8 @@ def _clean_recordings(folder: Path) -> list[Row]:
 
 
 def _wrong_vehicles(folder: Path) -> list[Row]:
-    """A car that is not the one of the file, R19-free: heavier, or with other springs."""
+    """Rows on recordings of a car that differs from its vehicle file R19-free: heavier, with stiffer springs, or with
+    weaker dampers."""
     findings_by_car = {
         name: errors_and_doubts(
             replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder
@@ -233,7 +235,7 @@ def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
 
 
 def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
-    """The delay of one channel over samples of noise: its bias."""
+    """Row: mean of the delay found in one channel over several noise samples, as a check of its bias."""
     samples = [planted(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
     late = 1e3 * float(
         np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
@@ -244,7 +246,7 @@ def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
 
 
 def _moving_car(folder: Path) -> list[Row]:
-    """Inertial checks of a real car's telephone, where the recording is there."""
+    """Rows: inertial checks on a real car's telephone recording, where it is available."""
     path = car.find()
     if path is None:
         return [
@@ -294,7 +296,7 @@ def _moving_car(folder: Path) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Table of the findings that an engineer is told."""
+    """Table of the findings that the checks report to an engineer."""
     rows = tuple((name, text) for name, text in data["said"].items())
     return [Table("What the checks say of planted faults", "The first sentence of each.", ("planted", "said"), rows)]
 

@@ -47,20 +47,22 @@ def samples() -> np.ndarray:
 
 
 def written(path: Path, values: np.ndarray) -> Path:
-    """Write the values in blocks of 700."""
+    """Write the values to a file in blocks of 700 samples; returns its path."""
     blocks = (values[i : i + 700] for i in range(0, len(values), 700))
     return write(path, [ChannelGroup(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
 
 
 def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
-    """Largest difference by the size of the value; inf where gaps differ."""
+    """Largest relative difference of the values from the true ones; infinite if other values are missing than should
+    be."""
     if not np.array_equal(np.isnan(values), np.isnan(truth)):
         return float("inf")
     return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
 def is_kept(source: Source) -> dict[str, bool]:
-    """Whether names, units, comments and start come back as they were given."""
+    """Whether names, units, comments and start time are read back as they were written, and nothing else was
+    reported."""
     return {
         "names": tuple(channel.name for channel in source.channels) == NAMES,
         "units": tuple(channel.unit for channel in source.channels) == UNITS,
@@ -92,7 +94,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
-    """One file written, read back by block, and opened by the format's own library."""
+    """Rows: a file is written, read back block by block, and opened with the format's own library."""
     truth, form = samples(), FORMATS[extension]
     began = time.perf_counter()
     source = open_source(written(path, truth))
@@ -173,7 +175,8 @@ def two_rates(path: Path, extension: str) -> Row:
 
 
 def forms(folder: Path) -> list[Row]:
-    """CSV in the forms of loggers, spreadsheets and scripts, and files of other kinds: read to the bit, or refused."""
+    """Rows: CSV files in the forms that loggers, spreadsheets and scripts write, and files of other kinds, are read
+    exactly or refused."""
     files = (*csv_forms.FILES, *kinds.FILES)
     ends = [_difference_or_error(odd, folder / f"form {i}") for i, odd in enumerate(files)]
     crashed = sorted({odd.name for odd, end in zip(files, ends, strict=True) if isinstance(end, str)})
@@ -209,7 +212,8 @@ def forms(folder: Path) -> list[Row]:
 
 
 def _difference_or_error(odd: OddFile, folder: Path) -> float | str | None:
-    """Difference to the truth, None where a file is refused and says why; the error where there is another one."""
+    """Error of the values read from a file; None if the file is refused with a reason; text of any other error that is
+    raised."""
     try:
         return odd.error(folder)
     except InputError:
@@ -219,15 +223,16 @@ def _difference_or_error(odd: OddFile, folder: Path) -> float | str | None:
 
 
 def wheel_force() -> np.ndarray:
-    """A wheel force (N) of ten seconds at 1 kHz, with one pothole that is forty times as large as the rest."""
+    """A wheel force (N) of ten seconds at 1 kHz, with one pothole whose force is forty times that of the normal
+    road."""
     load = np.convolve(normal(SEED, 1, 10_000, 1)[:, 0], np.ones(20) / 20.0, mode="same") * 450.0
     load[5000:5020] += 8e4 * np.sin(np.linspace(0.0, np.pi, 20)) / 2
     return load
 
 
 def resolution(folder: Path) -> list[Row]:
-    """Damage of the road without its pothole, with integer and with floating-point samples: why RPC III files are
-    written with the latter."""
+    """Rows: damage of the road without its pothole, with integer and with floating-point samples; RPC III files are
+    written in floating point for this reason."""
     load = wheel_force()
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
@@ -264,7 +269,7 @@ print(count, next(line for line in open("{STATUS}") if line.startswith("VmHWM"))
 
 
 def memory(path: Path, extension: str) -> list[Row]:
-    """Peak memory of a fresh process that reads five minutes of sixty channels by block."""
+    """Rows: peak memory of a fresh process that reads five minutes of sixty channels block by block."""
     key, form = f"measured_formats.{extension[1:]}.memory", FORMATS[extension]
     if not STATUS.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
@@ -290,7 +295,7 @@ def memory(path: Path, extension: str) -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Table of what each file format keeps."""
+    """Table of what each file format preserves."""
     note = (
         f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
         "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "

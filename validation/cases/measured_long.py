@@ -48,7 +48,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _guides(quick: bool) -> list[Row]:
-    """A car without any symmetry, turned and shaken: the guides' forces and moments by the engines themselves."""
+    """Rows: forces and moments of the suspension guides in a turning, shaken car without symmetry, compared with the
+    engines' own sensors."""
     car, worst = cut(twin(), "body"), 0.0
     sections = Sections(car, "hub")
     drive = shaken(car, "hub", guide=False)
@@ -88,7 +89,7 @@ def _guides(quick: bool) -> list[Row]:
 
 
 def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Forces and moments (guides, 6); components along which a body slides are nought."""
+    """Forces and moments (guides, 6) that guides transmit; components in which a guide lets its body slide are 0."""
     read = sections.read(numbers, np.concatenate((q, v))[None], 2)[0]
     values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
     return np.array(
@@ -97,7 +98,7 @@ def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.n
 
 
 def _counting() -> list[Row]:
-    """The example of the standard, and a sine of which all is known."""
+    """Rows: rainflow counting of the standard's example, and damage and counts of a sine, which are known exactly."""
     spans, _, counts = cycles(ASTM)
     by_span = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
     sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
@@ -135,7 +136,7 @@ def _counting() -> list[Row]:
 
 
 def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
-    """Samples that differ between a run in one piece and one in uneven blocks."""
+    """Row: number of channels that differ between a run in one block and a run in uneven blocks."""
     place = folder / f"blocks {seconds}"
     place.mkdir(exist_ok=True)
     job = run_of(place, seconds, REPEATED, engine, AttitudeHold(method))  # type: ignore[arg-type]
@@ -155,7 +156,7 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
 
 
 def _run_killed_twice(folder: Path) -> Row:
-    """A run killed twice, beside one that was left alone."""
+    """Row: number of channels that differ between a run that was killed twice and one that was not."""
     seconds, bits = 3.0, list[np.ndarray]()
     for times in (0, 2):
         place = folder / f"killed {times}"
@@ -178,7 +179,7 @@ def _run_killed_twice(folder: Path) -> Row:
 
 
 def _memory(folder: Path) -> list[Row]:
-    """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
+    """Rows: peak memory for an hour of recording, extrapolated from a shorter one, and the speed of the run."""
     run_of(folder, LONG_DURATION, REPEATED)
     words = map(str, (folder, LONG_DURATION, REPEATED, LONG_DURATION / 10, 2e-3))
     command = [sys.executable, "-m", "validation.measured.long_recording", *words]
@@ -206,7 +207,7 @@ def _memory(folder: Path) -> list[Row]:
 
 
 def _handed_on(folder: Path) -> list[Row]:
-    """Rows: section forces written in every format and read back; check channels compared with the run."""
+    """Rows: section forces written in every format and read back; measured check channels compared with the run."""
     place = folder / "handed on"
     place.mkdir()
     job = run_of(place, 2.0, REPEATED)

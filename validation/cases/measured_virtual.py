@@ -47,7 +47,8 @@ COPIES = 16
 
 @dataclass(frozen=True)
 class Proof:
-    """One virtual measurement: vehicle file (its own one is written into the folder), frame, converter, pull."""
+    """One virtual measurement to prove the whole chain: vehicle file, frame of the hub forces, bits of the converter,
+    stabiliser, and file formats."""
 
     name: str
     vehicle: str
@@ -87,14 +88,14 @@ def own_vehicle(folder: Path) -> str:
 
 
 def measured(proof: Proof, folder: Path, duration: float) -> VirtualMeasurement:
-    """The vehicle on its road, its faults left to each sample."""
+    """The virtual measurement of a vehicle on its road; faults and noise are added to each sample later."""
     table = {"duration": duration, "sampling_rate": RATE, "frame": proof.frame, "sections": ["front left"]}
     vehicle = cut(load_vehicle(proof.vehicle, folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
 def faults(bits: int) -> Faults:
-    """All that is planted."""
+    """All faults that are planted in the measurement."""
     table = {
         "noise": NOISE,
         "delay": dict.fromkeys(("angle", "angular rate"), RECORDER_DELAY),
@@ -107,7 +108,8 @@ def faults(bits: int) -> Faults:
 def recorded(
     virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, format_name: str, folder: Path
 ) -> Recording:
-    """Samples written by two recorders, hubs and inertial unit, in a format, and read back as a scene says."""
+    """Samples written as two recorders would, one for hubs and one for the inertial unit, in a file format, and read
+    back through a scene."""
     folder.mkdir(parents=True)
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
@@ -122,12 +124,13 @@ def recorded(
 
 
 def held_run(recording: Recording, vehicle: CutVehicle, hold: AttitudeHold, engine: str = "mujoco") -> SectionRun:
-    """Set up the run of a recording, with the vehicle held as ``hold`` says; the run is not yet marched."""
+    """The run of a recording, ready to be marched, with the vehicle's attitude stabilised as ``hold`` says."""
     return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
 def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
-    """Ten samples through every format, held; the first one free and in the other engine, too."""
+    """Rows and mean damage of ten noise samples through every file format, stabilised. The first sample is also run
+    free and in the other engine."""
     folder.mkdir()
     own_vehicle(folder)
     true, planted = measured(proof, folder, DURATION), faults(proof.bits)
@@ -155,13 +158,15 @@ def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, d
 
 
 def _differ_by_rounding(first: np.ndarray, two: np.ndarray) -> bool:
-    """Whether two recordings differ by nothing but the rounding of a unit, so that one run stands for both."""
+    """Whether two recordings differ only by rounding from unit conversion, in which case a single run serves for
+    both."""
     largest = np.maximum(np.nanmax(np.abs(first), axis=0), 1e-300)
     return bool(np.allclose(first / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
 def _largest_channel_change(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:
-    """Largest change of a hub channel by file, map and clock, by the channel's largest value."""
+    """Largest change of a hub channel by writing, mapping and resampling, relative to the channel's largest value;
+    infinite if other samples are missing."""
     largest_change = 0.0
     for i, signal in enumerate(true.signals):
         if signal.at in true.vehicle.hubs:
@@ -201,7 +206,7 @@ def _rows(proof: Proof, format_name: str, off: float, means: dict[str, float]) -
 
 
 def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
-    """Rows: the recording run free and held by both engines; the verdicts."""
+    """Rows: the recording run in both engines, free and stabilised, and the verdicts on these runs."""
     free = held_run(first, true.vehicle, AttitudeHold("none"))
     jobs = {engine: held_run(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
@@ -250,7 +255,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
 
 
 def _trust_times() -> list[Row]:
-    """Predicted times of trust and the medians of ensembles."""
+    """Rows: ratio of the median drift-off time of an ensemble to the predicted time of trust."""
     vehicle, rows = cut(load_vehicle("r19_free"), "body"), list[Row]()
     bias = np.zeros(6 * len(vehicle.hubs))
     bias[2] = 3.0
@@ -296,7 +301,8 @@ def true_frame(true: VirtualMeasurement) -> str:
 
 
 def _moving(folder: Path) -> list[Row]:
-    """A real car: a telephone's gyro and accelerometers, and its camera's angles, in two files of two clocks."""
+    """Rows on a real car: a telephone's gyro and accelerometers compared with the angles of its camera, from two files
+    with different clocks."""
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
         id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
@@ -323,7 +329,8 @@ def _moving(folder: Path) -> list[Row]:
 
 
 def _quick(folder: Path) -> list[Row]:
-    """One short sample through a file, the damage of a spring, and the closed law of the drift."""
+    """Rows of the quick share: one short noise sample through a file, the damage of a spring, and the closed law of
+    drift."""
     proof = PROOFS[0]
     true = measured(proof, folder, 0.6)
     samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)

@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _rows_without_integration(name: str) -> list[Row]:
-    """Rows: errors of quantities that need no integration, on a motion whose derivatives are closed forms."""
+    """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
     array = sensor_array(ARRAYS[name])
     clean = readings_on_path(array.positions)
     spins, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
@@ -89,7 +89,7 @@ def _rows_without_integration(name: str) -> list[Row]:
 
 
 def _plain() -> Row:
-    """Pitch acceleration by eq. (18) exactly as printed, which shows its error."""
+    """Row: angular acceleration by eq. (18) exactly as printed, which is wrong if all sensors lie in a plane."""
     floor = np.array(list(ARRAYS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
@@ -107,7 +107,7 @@ def _plain() -> Row:
 
 
 def _order() -> Row:
-    """Order of the whole chain, readings to position, in the sampling period."""
+    """Row: order of convergence in the sampling period of the position recovered from the readings."""
     array = sensor_array(ARRAYS["5 in a tilted plane"])
     clean = readings_on_path(array.positions)
     errors = [
@@ -139,7 +139,7 @@ def _tilt() -> Row:
 
 
 def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
-    """Noise of the angular acceleration by Monte Carlo against its law, by height of the fifth sensor."""
+    """Noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth sensor."""
     rows, lines = [], []
     for i, height in enumerate((*HEIGHTS, 0.0)):
         line = [height]
@@ -186,7 +186,8 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
 
 
 def _engine(engine: str, duration: float) -> list[Row]:
-    """Five rigid sensors and a loose one on each engine's own run over the study road."""
+    """Rows: motion recovered from five rigid sensors in an engine's run on the study road, and detection of a loose
+    sixth one."""
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in RIGID.items()} | {"battery": BRACKET}
     scene = build_scene(
         {
@@ -250,7 +251,8 @@ def _recovered_errors(
     states: np.ndarray,
     rates: np.ndarray | None,
 ) -> list[Row]:
-    """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
+    """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, relative
+    to its states (n, 8)."""
     followed = motion(array, specific_forces, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
     errors = (
         ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
@@ -270,7 +272,7 @@ def _recovered_errors(
 
 
 def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
-    """True rates (n, 3) of a body that never stops turning, an array, and its clean readings without gravity."""
+    """A body that turns all the time: true rates (n, 3), sensor array, and noise-free readings without gravity."""
     t = PERIOD * np.arange(count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
@@ -283,7 +285,7 @@ def _noise(path: int, count: int) -> np.ndarray:
 
 
 def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
-    """Integration alone: the rate walks off as the square root of time."""
+    """Row and curves: if rates are only integrated, their error grows with the square root of time."""
     count, array = 6001, sensor_array(ARRAYS["5, one 1 m up"])
     errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
     row = mean_square(
@@ -307,7 +309,7 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
 
 
 def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
-    """The symmetric part as a measurement: the error stays where it is."""
+    """Rows: if the symmetric part of the angular matrix is used as a measurement, the rate error stays bounded."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
     filtered = [

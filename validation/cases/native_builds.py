@@ -32,7 +32,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
-    """Accelerations, paths and counts of one car."""
+    """Rows on one car: accelerations, paths and counts of the native builds, compared with those of compiled forces."""
     states, steps = random_states(car, QUICK_STATES if quick else STATES), QUICK_STEPS if quick else STEPS
     where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {name}"
     rows = [
@@ -80,7 +80,8 @@ def _row_of_native_parts(name: str, car: CutVehicle, engine: str) -> Row:
 
 
 def _seconds(car: CutVehicle) -> list[Row]:
-    """Seconds of a step divided by those with compiled forces, least of interleaved runs: told, not judged."""
+    """Rows, without a verdict: ratio of the computing time of a step with native springs to that with compiled
+    forces."""
     rows = []
     for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
         models = {route: model(engine, car, route, TIMED) for route in ("native", "compiled")}

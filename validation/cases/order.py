@@ -56,7 +56,7 @@ def errors(
 
 
 def fitted_order(steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
-    """Slope of log error over log step by least squares."""
+    """Order of convergence: slope of log(error) over log(step) by least squares."""
     return float(np.polyfit(np.log(steps), np.log(errors_of_steps), 1)[0])
 
 

@@ -41,7 +41,8 @@ def _energy(handling: Handling, quick: bool) -> Row:
 
 
 def _lane_change(handling: Handling, duration: float) -> list[Row]:
-    """Both engines beside one another, and beside the plain equations at the state in which the drive ends."""
+    """Rows: difference between both engines in a lane change, and of each from the plain equations at the state at its
+    end."""
     drives = {engine: drive_run(engine, handling, SPEED, duration) for engine in ("exudyn", "mujoco")}
     states = [drive.run.states for drive in drives.values()]
     rows = [

@@ -68,7 +68,8 @@ def _row_of_fault_count(data: Saved) -> Row:
 
 
 def _lines(data: Saved) -> list[tuple[str, ...]]:
-    """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed it."""
+    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
+    missed it."""
     return [
         *pitch_plane.lines(data["pitch-plane"]),
         *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
@@ -76,7 +77,7 @@ def _lines(data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """All faults in one table, then each system's with sizes and what its checks are."""
+    """Table of all faults, then tables for each system with errors and descriptions of the checks."""
     lines = _lines(data)
     systems = len({line[0] for line in lines})
     note = (
@@ -93,5 +94,5 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """Draw how far above its tolerance each check of the pitch plane stands, fault by fault."""
+    """Plot how far above its tolerance each check's error is for every fault of the pitch plane."""
     return pitch_plane.draw(data["pitch-plane"])

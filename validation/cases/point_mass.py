@@ -80,7 +80,7 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
 
 
 def _exponential(matrix: Matrix) -> Matrix:
-    """Exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
+    """Matrix exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
     small = [[value / 2**20 for value in row] for row in matrix]
     term = total = _power(small, 0)
     for k in range(1, 25):
@@ -90,7 +90,8 @@ def _exponential(matrix: Matrix) -> Matrix:
 
 
 def _continuous_error(damped: float) -> float:
-    """Error of d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2 eta Pvv)."""
+    """Relative error of the continuous covariance, which obeys d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2
+    eta Pvv)."""
     eta = damped / TIME
     with localcontext(prec=DIGITS):
         e, t = Decimal(eta), Decimal(TIME)
@@ -106,7 +107,8 @@ def _continuous_error(damped: float) -> float:
 
 
 def _discrete_error(damped: float, steps: int) -> float:
-    """Error of the covariance recursion of one Euler step; the step is such that ``steps`` of them make TIME."""
+    """Relative error of the discrete covariance, compared with the matrix recursion of an Euler step in many digits.
+    ``steps`` of these steps make TIME."""
     step = TIME / steps
     eta = min(damped / TIME, 1.9 / step)
     with localcontext(prec=DIGITS):
@@ -130,14 +132,15 @@ def _largest_relative_error(computed: np.ndarray, truth: Sequence[Decimal]) -> f
 
 
 def _difference(damped: float, steps: int) -> float:
-    """1 - discrete by continuous variance of position."""
+    """1 - ratio of the discrete to the continuous variance of the position."""
     step = TIME / steps
     arguments = (DEVIATION, step, MASS, damped / TIME)
     return 1 - float(discrete(steps, *arguments)[0, 0] / continuous(TIME, *arguments)[0, 0])
 
 
 def _monte_carlo(damped: float, count: int) -> list[Row]:
-    """Position alone, and position and velocity together by their squared distance in the law's own metric."""
+    """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
+    inverse covariance of the law."""
     steps = 1000
     arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
     law, drawn = discrete(steps, *arguments), paths(count, steps, *arguments, seed=SEED)

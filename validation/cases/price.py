@@ -82,8 +82,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _beside(quick: bool) -> CaseAnswer:
-    """Answers of price cases without a problem for the runner: ride, the parts of a step, force calls, claims about
-    speed."""
+    """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
+    claims about speed."""
     road = assemble(road_excited.scene())
     rows, prices = ride.measure(quick, ROUNDS[quick], SHORTEST_TURN[True])
     rounds, least, duration = 2 * ROUNDS[quick], 2 * SHORTEST_TURN[quick], road_excited.DURATION
@@ -105,8 +105,8 @@ def _priced(quick: bool, make_problem: Make) -> CaseAnswer:
 
 
 def _in_processes() -> tuple[list[CaseAnswer], CaseAnswer]:
-    """All problems, and what is beside them, by as many processes as there are processors, two at most; the first of
-    the problems last, but for the road, which is long."""
+    """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
+    the road, which takes long, is started before."""
     with processes(min(2, os.cpu_count() or 1)) as pool:
         first, *others = PROBLEMS + FULL_ONLY
         road, beside = pool.submit(_priced, False, first), pool.submit(_beside, False)
@@ -145,12 +145,12 @@ def _road_rows(saved_rows: Saved) -> list[Row]:
 
 
 def _at_1_ms(setting: Setting) -> Setting:
-    """One setting per fixed-step method; adaptive methods keep theirs."""
+    """For every fixed-step method the setting with a step of 1 ms; adaptive methods keep their own settings."""
     return setting if setting.adaptive else road_excited.setting(setting.engine, setting.method, 1e-3)
 
 
 def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
-    """Row: force calls that the adapters state, against calls counted from outside."""
+    """Row: force calls that each engine reports, compared with calls counted from outside."""
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
@@ -179,7 +179,7 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
 
 
 def _speed_rows(data: Saved) -> list[Row]:
-    """Targets about seconds: reported with their intervals, never judged."""
+    """Rows on target speeds, reported with their intervals and without a verdict."""
     rows = [
         Observed(
             "price.callback.gap",

@@ -51,7 +51,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _car(folder: Path, values: dict[str, float]) -> SingleTrackScene:
-    """A car with a drive of both sides at several rates."""
+    """Scene of a car with a drive that steers, brakes and accelerates, at several sampling rates."""
     table: dict[str, Any] = {
         "title": "a known car",
         "system": "single-track",
@@ -73,7 +73,8 @@ def _drive(folder: Path) -> None:
 
 
 def _noisy(scene: SingleTrackScene, seed: int) -> Problem:
-    """The problem of finding the car again from its channels with noise, from other values."""
+    """Identification problem: the car's parameters are to be found from its noisy channels, starting from other
+    values."""
     driven, random = run(scene), np.random.default_rng(seed)
     columns = {n: (unit, driven[n] + size * random.standard_normal(len(TIMES))) for n, (unit, size) in NOISE.items()}
     path = Path(scene.folder) / f"known measured {seed}.csv"
@@ -113,7 +114,8 @@ def _known_rows(folder: Path) -> list[Row]:
 
 
 def _coverage(fits: list[Uncertainty]) -> float:
-    """Bands of each fit around the measurement of the next noise: the least share of a channel inside, over all."""
+    """Least share of measured samples inside the prediction bands, over all fits and channels. Each fit's bands are
+    compared with the measurement of the next noise sample."""
     shares = []
     for known, other in zip(fits, [*fits[1:], fits[0]], strict=True):
         problem = known.fit.problem
@@ -156,7 +158,8 @@ def _race_rows(identified: Identified) -> list[Row]:
 
 
 def _sensors_row(path: Path) -> Row:
-    """Measured lateral acceleration beside what measured speed, yaw rate and side slip say of it, no model in between.
+    """Row: measured lateral acceleration compared with that from measured speed, yaw rate and side slip, which needs no
+    model.
 
     A sensor that rolls with the body reads g sin(roll) beside, a share of the lateral acceleration; one that lies
     elsewhere or is late differs as the motion changes.

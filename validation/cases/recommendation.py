@@ -45,7 +45,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _shared(folder: Path) -> list[Judged]:
-    """Judged recommendations, computed by as many processes as there are processors, two at most; long ones first."""
+    """Verdicts on recommendations, computed by at most two processes, with the long computations first."""
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
         return [
@@ -57,7 +57,8 @@ def _shared(folder: Path) -> list[Judged]:
 
 
 def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
-    """Verdicts on a scene of a system, none if it was refused once more than REDRAWS times; the reasons."""
+    """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
+    verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
     for n in range(number, number + (REDRAWS + 1) * STRIDE, STRIDE):
         try:
@@ -74,7 +75,8 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
 
 
 def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
-    """The three promises; a scene counts as held if every setting recommended for it does."""
+    """Rows on the three promises of a recommendation; a scene counts as kept if every recommended setting keeps its
+    promise."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
     held = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]

@@ -58,7 +58,8 @@ def _vehicle(name: str, seed: int = 0) -> SpatialVehicle:
 
 
 def _jobs(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
-    """Vehicle, seed of its twin or 0, its own road or None for the paper's, speed."""
+    """The vehicles and roads to compare: vehicle, seed of its random variant or 0, seed of a random road or None for
+    the paper's, speed."""
     if quick:
         yield from (("r19_ride", 0, None, 20.0), ("three_axle_truck", SEED, _random_road(SEED), 13.0))
         return
@@ -71,14 +72,15 @@ def _jobs(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
 
 
 def _random_road(seed: int) -> TwoTrackRoad:
-    """Corners over a decade, intensities over two."""
+    """Random road whose corner wavenumbers vary over a decade, and intensities over two decades."""
     rng = np.random.default_rng(seed)
     mean, roll = (ShapeFilter(10 ** rng.uniform(-1.5, 0.5), 1e-5 * 10 ** rng.uniform(-1, 1)) for _ in range(2))
     return TwoTrackRoad(mean, roll)
 
 
 def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
-    """Largest relative difference of standard deviations, of all outputs in all five cases, and both own errors."""
+    """Largest relative difference between standard deviations by covariance and by quadrature, over all outputs and
+    five cases of correlation, with the error that each route states."""
     vehicle = linearise(_vehicle(name, seed), speed)
     compared = [
         _compared(vehicle, vehicle, excitation, speed) for excitation in five_cases(vehicle.wheels, road).values()
@@ -96,8 +98,8 @@ def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float
 def _compared(
     vehicle: LinearVehicle, analytic: LinearVehicle, road: Excitation, speed: float
 ) -> tuple[float, float, float, int]:
-    """Largest relative difference of the covariance of a vehicle from quadrature of the analytic one, what each says of
-    its own error, and how many outputs are not zero by symmetry."""
+    """Largest relative difference between a vehicle's covariance and quadrature on the analytic vehicle, the error that
+    each route states, and the number of outputs that do not vanish by symmetry."""
     covariance, integrals = stationary(excited(vehicle, road, speed)), quadrature(analytic, road, speed)
     told = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
     worst = off(covariance.deviation[told], np.sqrt(integrals.variance[told]))
@@ -105,7 +107,7 @@ def _compared(
 
 
 def _closed_rows() -> list[Row]:
-    """Quarter car and half car against their formulas."""
+    """Rows: quarter car and half car compared with closed formulas."""
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
         variance = stationary(excited(corners([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)).variance
@@ -152,7 +154,7 @@ def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
 
 
 def _limit_rows() -> list[Row]:
-    """Delays of zero and without end, and the road's own covariances."""
+    """Rows: limits of zero and infinite delay between the axles, and covariances of the road itself."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road = paper_road(vehicle.wheels)
     lagged = excited(vehicle, road, 20.0)
@@ -198,7 +200,7 @@ def _inputs_row() -> Row:
 
 
 def _engine_row(engine: str) -> Row:
-    """The engines' own linearisation through the covariance, against quadrature of the analytic vehicle."""
+    """Row: covariance of an engine's own linearised vehicle, compared with quadrature on the analytic vehicle."""
     from models.engines.spatial_protocol import build
 
     worst = 0.0
@@ -218,8 +220,8 @@ def _engine_row(engine: str) -> Row:
 
 
 def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
-    """Rows and data of the fast route: five cases of correlation over speeds with weighting, fast and direct, timed in
-    this process's own seconds."""
+    """Rows and data on the fast route: five cases of correlation over many speeds with weighting, by the fast and the
+    direct route, with processor times."""
     vehicle = _vehicle("r19_ride")
     linear = linear_vehicle(vehicle, source)
     roads = five_cases(linear(20.0).wheels)
@@ -270,7 +272,7 @@ BODY_POINTS = ("body front", "body centre", "body rear")
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """Agreement of the two routes beside what each claims of itself."""
+    """Table of the agreement between two routes, with the error that each states."""
     rows = tuple(
         (
             route["vehicle"],

@@ -55,12 +55,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def of_name(name: str, gravity: float = 0.0) -> SpatialVehicle:
-    """A shipped vehicle or the twin, unloaded or under gravity."""
+    """A shipped vehicle, or the asymmetric twin, with or without gravity."""
     return spatial_twin.vehicle(gravity) if name == "spatial twin" else replace(load_vehicle(name), gravity=gravity)
 
 
 def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """Digressive and asymmetric dampers, bump stops and dry friction in the first four springs."""
+    """The vehicle with nonlinear elements in its first four springs: digressive and asymmetric dampers, bump stops and
+    dry friction."""
     bent = [
         replace(spring, damping=0.0, rate_force=DIGRESSIVE, travel_force=BUMP_STOPS, friction=FRICTION)
         for spring in vehicle.springs[:4]
@@ -69,7 +70,8 @@ def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
 
 
 def difference(computed: LinearVehicle, expected: LinearVehicle) -> float:
-    """Largest error of M, D, K, the road's columns and the outputs, each relative to its own largest entry."""
+    """Largest error of M, D, K, the road's columns and the outputs; each matrix is compared relative to its largest
+    entry."""
     matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
     sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed, expected, matrices)]
     sides += [(a, b, OutputRows._fields) for a, b in zip(computed.outputs, expected.outputs, strict=True)]
@@ -77,13 +79,14 @@ def difference(computed: LinearVehicle, expected: LinearVehicle) -> float:
 
 
 def relative(computed: np.ndarray, expected: np.ndarray) -> float:
-    """Largest difference over the largest expected entry, or the difference where all of these are 0."""
+    """Largest difference, divided by the largest expected magnitude unless that is 0."""
     size = float(np.abs(expected).max(initial=0.0))
     return float(np.abs(computed - expected).max(initial=0.0)) / (size or 1.0)
 
 
 def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions of 0.05 m and rad, rates of 0.5 per s, and a road of 0.05 m and m/s: all standard deviations."""
+    """Random state with standard deviations of 0.05 m or rad for coordinates and 0.5 per s for rates, and a random road
+    with 0.05 m and m/s."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
     drawn = normal(SEED, path, 1, 2 * n + 2 * w)[0]
     return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
@@ -117,7 +120,8 @@ def _frequencies() -> list[Row]:
 
 
 def _states(name: str) -> list[Row]:
-    """Accelerations with curves, gravity and a road, both engines against each other and the equations."""
+    """Rows: accelerations at random states with nonlinear springs, gravity and a road, compared between the engines and
+    with the equations."""
     vehicle = curved(of_name(name, GRAVITY)) if name != "quarter_car" else of_name(name, GRAVITY)
     built = (build(engine, vehicle, speed=SPEED) for engine in ENGINES)
     models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
@@ -173,7 +177,7 @@ def _path() -> tuple[list[Row], list[list[str]]]:
 
 
 def _at_rest() -> list[Row]:
-    """The design position under gravity: nothing accelerates, and 1 s later nothing has moved."""
+    """Rows: in the design position under gravity nothing accelerates, and nothing has moved after 1 s."""
     rows = []
     vehicle = curved(of_name("r19_ride", GRAVITY))
     zero = np.zeros(len(vehicle.coordinates()))
@@ -224,7 +228,8 @@ def _shift() -> list[Row]:
 
 
 def _without_curves() -> list[Row]:
-    """A vehicle without curves has no curve code; with them one function per spring that bends."""
+    """Row: a vehicle with linear springs has no curve functions, and one with nonlinear springs has one for each of
+    them."""
     plain, bent = (build("exudyn", vehicle).plan() for vehicle in (of_name("r19_ride"), curved(of_name("r19_ride"))))
     counts = f"{plain['curves']} curves, {bent['callbacks'] - plain['callbacks']} functions more with curves"
     return [
@@ -240,7 +245,7 @@ def _without_curves() -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """What a simulated second costs."""
+    """Table of computing times for one simulated second."""
     if not data["price"]:
         return []
     note = (

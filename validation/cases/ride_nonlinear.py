@@ -46,7 +46,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _gains() -> list[Row]:
-    """Closed forms against the defining integrals, from laws that are all corner to laws that look straight."""
+    """Rows: gains by closed forms compared with their defining integrals, for spring laws from a single corner to
+    nearly straight ones."""
     spring = ride(NONLINEAR)[0].springs[0]
     worst, dry = 0.0, 0.0
     for curve, mean, size in ((spring.rate_force, 0.0, 0.3), (spring.travel_force, 0.01, 0.02)):
@@ -101,7 +102,8 @@ def expected(law: Any, cuts: Any) -> float:
 
 
 def _fixed_point() -> list[Row]:
-    """Reached, and the same from elsewhere; gravity moves nothing in a vehicle that only goes up and down."""
+    """Rows: statistical linearisation converges, to the same gains from another start; gravity has no effect on a
+    vehicle that only moves vertically."""
     vehicle, road = ride(NONLINEAR, 4.0)
     first, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
@@ -133,7 +135,8 @@ def _fixed_point() -> list[Row]:
 
 
 def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
-    """Deviations and mean travel beside Monte Carlo, each by what its sentence promises."""
+    """Rows at one road level: deviations and mean travel by statistical linearisation, compared with Monte Carlo. The
+    tolerance of each is the accuracy that the result's sentences state."""
     vehicle, road = ride(NONLINEAR, level)
     linear = statistically_linear(vehicle, road, SPEED)
     copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
@@ -180,7 +183,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
 
 
 def _linear_copies() -> Row:
-    """Row: without bent springs the copies' variances agree with the covariance."""
+    """Row: without nonlinear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = ride("quarter_car")
     exact = stationary(excited(linearise(vehicle), road, SPEED))
     copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)
@@ -194,7 +197,7 @@ def _linear_copies() -> Row:
 
 
 def _alone() -> list[Row]:
-    """Each law by itself where it is at its worst: what the sentences promise was found on these, too."""
+    """Rows: each nonlinear law alone, at the road level at which statistical linearisation is least accurate."""
     vehicle, _ = ride(NONLINEAR)
     spring = vehicle.springs[0]
     others: dict[str, tuple[float, dict[str, Any]]] = {
@@ -232,7 +235,7 @@ def _alone() -> list[Row]:
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """What statistical linearisation is worth."""
+    """Table of the errors of statistical linearisation."""
     names = [output.name for output in ride(NONLINEAR)[0].outputs]
     note = (
         "Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "

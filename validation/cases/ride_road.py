@@ -48,7 +48,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _paper_rows() -> list[Row]:
-    """Rows: values read from the paper's figure, and the label."""
+    """Rows: values read from the paper's figure, and its road class label."""
     road = road_of_level(HALF_TRACK)
     spectrum = road.spectrum(np.array([1e4]), HALF_TRACK)[0] * 1e8
     variance = 2.0 * quad(lambda k: float(road.spectrum(np.array(k), HALF_TRACK)), 0.0, math.inf, epsabs=1e-18)[0]
@@ -82,7 +82,8 @@ def _paper_rows() -> list[Row]:
 
 
 def _input_rows() -> list[Row]:
-    """The five cases as filters of delayed noise against the delayed outputs of one filter."""
+    """Rows: height covariances of the wheels in five cases of correlation, by filters with delayed noise, compared with
+    delayed outputs of one filter."""
     worst = {"first": 0.0, "second": 0.0}
     for order, cutoff in (("first", None), ("second", 40.0)):
         road = road_of_level(HALF_TRACK, cutoff=cutoff)
@@ -105,7 +106,8 @@ def _input_rows() -> list[Row]:
 
 
 def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
-    """Covariance (w, w) in m^2 of the heights under the wheels by the Lyapunov equation of all axles' filters."""
+    """Covariance (w, w) in m^2 of the road heights under the wheels, from the Lyapunov equation of the filters of all
+    axles."""
     axles, C = np.eye(len(road.heights)), np.hstack(road.heights)
     B = tuple(np.kron(axles[:, [i]], speed**0.5 * road.G) for i in range(len(axles)))
     D = tuple(np.zeros((len(C), road.G.shape[1])) for _ in B)
@@ -116,7 +118,7 @@ def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
 
 
 def _limit_row() -> Row:
-    """Axles in one place are one input; axles far apart know nothing of one another."""
+    """Row: the heights of axles at the same place are equal, and those of axles far apart are uncorrelated."""
     road = road_of_level(HALF_TRACK)
     pairs = []
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
@@ -137,7 +139,8 @@ def _limit_row() -> Row:
 
 
 def _isotropic_rows() -> list[Row]:
-    """Closed forms with Bessel functions against the transforms that define them; and what isotropy changes."""
+    """Rows: closed forms of an isotropic road by Bessel functions, compared with the integrals that define them; effect
+    of isotropy."""
     road, apart, k = road_of_level(HALF_TRACK), 2.0 * HALF_TRACK, np.array([0.05, 0.3, 1.0, 3.0])
     closed = isotropic_like(road, HALF_TRACK).cross_spectrum(k, apart)
     along = cross_spectrum_of(lambda r: float(road.covariance(np.array(r), HALF_TRACK, HALF_TRACK)), list(k), apart)
@@ -186,7 +189,8 @@ def _by_surface_density(spectrum_part: DensityPart, k: float, track_distance: fl
 
 
 def _route_rows(road: TwoTrackRoad) -> list[Row]:
-    """Frequency route against covariance on the built-in vehicle, and the isotropic road through the same route."""
+    """Rows: frequency responses compared with the covariance on the built-in vehicle, and an isotropic road by the same
+    route."""
     vehicle = linearise(load_vehicle("r19_ride"))
     exact = _accelerations(stationary(excited(vehicle, excitation(road, vehicle.wheels), SPEED)).deviation, vehicle)
     by_frequency, isotropic = (_by_frequency(vehicle, each) for each in (road, isotropic_like(road, HALF_TRACK)))
@@ -231,7 +235,8 @@ def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) ->
 
 
 def _weighting_rows() -> list[Row]:
-    """The standard's table, the filters' states against their formulas, and weighted accelerations by two routes."""
+    """Rows: the standard's table of weightings, filters compared with their formulas, and weighted accelerations by two
+    routes."""
     frequency, wk, wd = np.array(STANDARD).T
     rows = []
     for name, table in (("Wk", wk), ("Wd", wd)):
@@ -270,7 +275,7 @@ def _weighting_rows() -> list[Row]:
 
 
 def _weighted_rows() -> list[Row]:
-    """a_w by Lyapunov and by quadrature, on a vehicle."""
+    """Rows: weighted acceleration a_w of a vehicle by the Lyapunov equation and by quadrature."""
     vehicle = linearise(load_vehicle("r19_ride"))
     road = road_of_level(HALF_TRACK)
     filters = {"left occupant": "Wk", "body centre": "Wd"}

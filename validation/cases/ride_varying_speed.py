@@ -63,7 +63,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 @cache
 def ride(name: str, tyre_damping: float = 0.0, cutoff: float | None = None) -> tuple[LinearVehicle, Excitation]:
-    """A shipped vehicle and the paper's road under it, rear wheels delayed; one without a width runs on one track.
+    """A shipped vehicle and the paper's road, which reaches the rear wheels with a delay. A vehicle without a track
+    width has one track.
 
     ``cutoff`` (rad/m): a second corner of the road.
     """
@@ -73,7 +74,8 @@ def ride(name: str, tyre_damping: float = 0.0, cutoff: float | None = None) -> t
 
 
 def _limits(name: str, stops: SpeedProfile) -> list[Row]:
-    """Stationary after a change of speed and at constant speed; the road itself, always; half the step."""
+    """Rows on limits: stationary covariance long after a change of speed and at constant speed, the road's own
+    covariance, and half the step."""
     vehicle, road = ride(name)
     system = at_speed(vehicle, road, STEADY_SPEED)
     exact, settling = stationary(system).deviation, -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max()
@@ -119,7 +121,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
 
 
 def _adjoint() -> Row:
-    """Compares the end of a drive that includes a stop with the same quantity computed by the other route."""
+    """Row: covariance at the end of a drive with a stop, compared with the same value by the adjoint equation."""
     vehicle, road = ride("half_car")
     varied = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
@@ -134,7 +136,8 @@ def _adjoint() -> Row:
 
 
 def _damped() -> Row:
-    """Tyre damping brings white noise into the tyre force, while the road moves."""
+    """Row: with a damped tyre, white noise makes the variance of the tyre force infinite as long as the vehicle
+    moves."""
     varied = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
     force, moving = varied.of("tyre force front left"), varied.speed > 0.0
     said = "infinite" if np.isinf(force[moving]).all() else "finite"
@@ -150,7 +153,8 @@ def _damped() -> Row:
 
 
 def _drive(profile: SpeedProfile) -> dict[str, Any]:
-    """The 19 freedoms along a drive: covariance, quasi-stationary, copies, and the seconds."""
+    """Rows and data of a vehicle with 19 freedoms on a drive: covariance, quasi-stationary solution, Monte Carlo
+    copies, and computing times."""
     vehicle, road = ride("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
     copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
@@ -173,7 +177,8 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
 
 
 def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
-    """Copies at three instants in three points, all outputs beside, and the error of the quasi-stationary answer."""
+    """Rows: Monte Carlo copies at three instants, judged at three points of the body; all outputs and the error of the
+    quasi-stationary solution are reported."""
     error = off(np.array(drive["quasi"]), np.array(drive["deviation"]))
     return [
         Observed(
@@ -205,7 +210,7 @@ def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
 
 
 def _constant() -> list[Row]:
-    """Copies at constant speed, and what one digit costs by either way."""
+    """Rows: Monte Carlo copies at constant speed, and what one more digit costs by them and by the covariance."""
     vehicle, road = ride("r19_ride")
     exact = stationary(at_speed(vehicle, road, STEADY_SPEED))
     fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(REPEATS)])[1] / REPEATS
@@ -249,13 +254,14 @@ def _constant() -> list[Row]:
 
 
 def _timed(run: Callable[..., Any], *given: Any, **more: Any) -> tuple[Any, float]:
-    """Value of a call, and its processor seconds."""
+    """Result of a call, and its processor time (s)."""
     start = time.process_time()
     return run(*given, **more), time.process_time() - start
 
 
 def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
-    """Standard deviation of one output at a drive's end, from what it sees of the noise at each place of the road.
+    """Standard deviation of one output at a drive's end by the adjoint equation, from the output's response to the road
+    noise at each position.
 
     Backward in time l' = -A' l from l = C: noise that axle i meets at t moves the output by l(t) . B_i. The drive
     begins in motion and is taken as even long before.
@@ -289,7 +295,7 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
 
 
 def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Places (m) and weights of an integral over the road, fine in the time of every axle."""
+    """Quadrature points (m) along the road and their weights, dense enough for the fast response of every axle."""
     fine = [np.linspace(start, stop, int(np.ceil((stop - start) / 0.02)) + 1) for start, stop in pairwise(cuts)]
     passed = profile.path(np.unique(np.concatenate(fine)))
     cells = np.unique(np.concatenate([passed - length for length in lengths]))
@@ -299,7 +305,7 @@ def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float,
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
-    """z of the copies, instant by instant."""
+    """Table of the deviations of the Monte Carlo copies in standard errors (z), at each instant."""
     rows = [
         (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
         for name, drive in data.items()
@@ -312,7 +318,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Standard deviations over time, quasi-stationary beside."""
+    """Plot standard deviations over time, with the quasi-stationary solution for comparison."""
     if not data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots

@@ -71,7 +71,7 @@ def _round_trips(folder: Path) -> list[Row]:
 
 
 def _write_csv(road: RoadProfile, path: Path) -> None:
-    """Heights up in mm, as a surveyor would hand them over."""
+    """Write road heights to a CSV file as a surveyor would: upward, in mm."""
     station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
     up = -1e3 * road.height_and_slope(station)[0]
     np.savetxt(
@@ -98,7 +98,7 @@ def _recurrence() -> Row:
 
 
 def _class_variance() -> Row:
-    """Variance of a class C road against the integral of its density over the band."""
+    """Row: variance of a class C road, compared with the integral of its spectral density over the band."""
     low, high = 0.05, 2.0
     road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]

@@ -68,7 +68,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _conventions() -> list[Row]:
-    """Our shortcut by turning points is the library's count, and what other conventions would make of it."""
+    """Rows: counting cycles from turning points alone gives the library's result, and how other conventions would
+    change it."""
     from rainflow import extract_cycles
 
     walk = normal(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
@@ -98,12 +99,13 @@ def _conventions() -> list[Row]:
 
 
 def _closed(load: np.ndarray) -> float:
-    """Damage of one period of a load that goes on for ever: what a second pass adds to the first."""
+    """Pseudo-damage of one period of a load that is repeated for ever: the amount that a second period adds to the
+    first."""
     return pseudo_damage(np.concatenate((load, load))) - pseudo_damage(load)
 
 
 def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
-    """Rows: a run at rest and one sinking as a whole: heave runs away, section forces stay the same."""
+    """Rows: in a run that sinks steadily, the heave error grows, but the section forces are right."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         drive(folder, duration)
@@ -135,7 +137,7 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
 
 
 def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
-    """Heave error (m) and worst damage error."""
+    """Heave error (m) of the sinking run, and its largest damage error."""
     scene = force_scene(folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
     still, moved = (simulate(each, engine) for each in (scene, sinking))
@@ -144,7 +146,8 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
 
 
 def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
-    """Rows: on a grade of 0.1 rad a holding spring is wrong and a prescribed pitch is right, in each implementation."""
+    """Rows: on a grade of 0.1 rad a holding spring gives wrong results, and a prescribed pitch right ones, in each
+    implementation."""
     scene = load(SCENE, QUICK_OPTIONS)
     options = read(Options, scene.options, "", "options")
     (folder / "short").mkdir()
@@ -178,7 +181,8 @@ def _study(folder: Path) -> list[Saved]:
 
 
 def _verdicts(studied: list[Saved]) -> list[Row]:
-    """Known-good and known-bad runs get their words; the blind one is judged where it can know."""
+    """Rows: runs known to be good or bad get the right verdict. Without the true run, the verdict is judged for bad
+    runs only."""
     rows = []
     for row in studied:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
@@ -210,7 +214,8 @@ def _id(row: Saved) -> str:
 
 
 def _blind(studied: list[Saved]) -> list[Row]:
-    """The vertical force of a run that has tumbled."""
+    """Rows: the damage of the vertical section force is nearly right even in a run that has tumbled, so it must not be
+    used as a score."""
     return [
         Observed(
             f"score.vertical.{row['road']}.{row['engine']}",
@@ -232,7 +237,7 @@ def _blind(studied: list[Saved]) -> list[Row]:
 
 
 def _long(folder: Path) -> list[Saved]:
-    """The prototype's methods over 60 s at 1 kHz on the road, in the reference."""
+    """The prototype's stabilisers over 60 s at 1 kHz on the road, in the reference."""
     scene = load(SCENE, FULL_OPTIONS)
     (folder / "long").mkdir()
     bench = Bench(scene, "road", read(Options, scene.options, "", "options"), folder / "long")
@@ -245,7 +250,8 @@ def _scored(bench: Bench, name: str, engine: str = "reference") -> Saved:
 
 
 def _beside(long: list[Saved]) -> list[Row]:
-    """Pitch errors of 60 s beside the prototype's; a tumbled run has no damage to show."""
+    """Rows: pitch errors and damage ratios over 60 s, reported next to the prototype's; a tumbled run has no damage
+    ratio."""
     rows = []
     for row in long:
         pitch, upright, along = PROTOTYPE[row["method"]]
@@ -312,7 +318,7 @@ def _cells(row: Saved) -> tuple[str, ...]:
 
 
 def draw(data: Saved) -> Drawn:
-    """The study's figure to decide from."""
+    """Plot the study's score of the stabilisers."""
     if not data["study"]:
         return []
     from models.drawing.drift import decision

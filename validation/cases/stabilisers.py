@@ -65,19 +65,20 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def write_motion(measured_run: Result, folder: Path, ahead: float = 0.0) -> None:
-    """Heave of a point ``ahead`` (m) of the true centre of mass, and pitch, as the file that scenes follow."""
+    """Write the pitch, and the heave of a point ``ahead`` (m) of the true centre of mass, to the file that guided
+    scenes read."""
     pitch = measured_run["pitch"]
     columns = {"z3": ("m", measured_run["z3"] - ahead * np.sin(pitch)), "pitch": ("rad", pitch)}
     write_time_series(folder / "motion.csv", columns, STEP)
 
 
 def guided(scene: Scene, engine: str) -> Result:
-    """A guided run by the integrator that solves for what its motion takes."""
+    """A run with prescribed motion, by the engine's integrator that can solve constraints."""
     return simulate(scene, engine, Settings(CONSTRAINED[engine], STEP, scene.run.duration, spectral_radius=0.6))
 
 
 def _missing_mass(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
-    """The model lacks 5 % of the chassis: a force down, dm (g - z3'')."""
+    """Rows: if the model's chassis is 5 % too light, prescribing the heave takes a mean force of dm (g - z3'')."""
     write_motion(measured_run, folder)
     scene = follow({"m3": (1 - MISSING) * p.m3}, RAILS)
     rate = measured_run["z3_rate"]
@@ -99,7 +100,8 @@ def _missing_mass(parameters: str, p: Parameters, measured_run: Result, follow: 
 
 
 def _shifted_centre(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
-    """The model's centre of mass lies ahead of the true one, its struts where they are: a moment, nose up."""
+    """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
+    up."""
     write_motion(measured_run, folder, SHIFT)
     scene = follow({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
     wanted = SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
@@ -117,7 +119,7 @@ def _shifted_centre(parameters: str, p: Parameters, measured_run: Result, follow
 
 
 def _dead_band_and_moment(follow: Follow, duration: float) -> list[Row]:
-    """A dead band and an added moment in both engines against the reference."""
+    """Rows: a spring with a dead band, and an added moment, in both engines compared with the reference."""
     assembly = assemble(follow({}, BAND))
     times = STEP * np.arange(round(duration / STEP) + 1)
     moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
@@ -140,7 +142,7 @@ def _dead_band_and_moment(follow: Follow, duration: float) -> list[Row]:
 
 
 def _high_pass(follow: Follow) -> Row:
-    """The slow pole of the linearised vehicle, which is the filter's own."""
+    """Rows on the high-pass: the slow pole of the linearised vehicle with the filter is the filter's own."""
     corner, ratio = 2 * np.pi * CUT_OFF, 0.7
     vehicle = assemble(follow({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
     poles = np.linalg.eigvals(first_order(linearised(vehicle)))

@@ -47,7 +47,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
-    """Samples of each system, by as many processes as there are processors, two at most, where there are several."""
+    """Samples of each system, computed by at most two processes; by this process if there is only one system."""
     if len(counts) == 1:
         return [samples(name, count) for name, count in counts.items()]
     with processes(min(2, os.cpu_count() or 1)) as pool:
@@ -55,13 +55,14 @@ def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
 
 
 def samples(name: str, count: int) -> list[Saved]:
-    """Samples of a system as JSON keeps them."""
+    """Samples of a system in the form for JSON."""
     drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
     return [_sample_as_table(name, sample) for sample in drawn]
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
-    """A sample as JSON keeps it; ``ratio`` : true divided by stated error, None where there is no number."""
+    """A sample in the form for JSON; ``ratio``: ratio of the true to the stated error, None where no number is
+    stated."""
     told = {
         "system": system,
         "name": sample.name,
@@ -85,12 +86,13 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
 
 
 def ratio(true: float, stated: float) -> float:
-    """True divided by stated error."""
+    """Ratio of the true to the stated error."""
     return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
 
 
 def _rows(samples: list[Saved], quick: bool) -> list[Row]:
-    """Rows on the stated errors of all systems together; shares of a quick run's few samples are only reported."""
+    """Rows on the stated errors of all systems together. A quick run has few samples, so its shares are reported
+    without a verdict."""
     known = [sample for sample in samples if sample["ratio"] is not None]
     right = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
     useless = _share_of_true(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
@@ -137,13 +139,13 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
 
 
 def _share_of_true(hits: Iterator[bool]) -> float:
-    """Share of what is true; 1 of nothing."""
+    """Share of true entries; 1 if there are no entries."""
     counted = list(hits)
     return float(np.mean(counted)) if counted else 1.0
 
 
 def _cost(name: str, samples: list[Saved]) -> float:
-    """Median cost of a system's estimates, those without a number left out where others have one."""
+    """Median cost of a system's error estimates; estimates without a number count only if all are of this kind."""
     of_system = [sample for sample in samples if sample["system"] == name]
     return float(
         np.median(
@@ -173,7 +175,7 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """Every sample, those whose true error is the largest by the stated one first."""
+    """Table of all samples, sorted by the ratio of the true to the stated error, largest first."""
     known = sorted(
         (sample for sample in data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
     )
@@ -197,7 +199,7 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """True over stated error, both by the channel's deviation."""
+    """Plot true error over stated error, both divided by the channel's standard deviation."""
     from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, subplots
 
     figure, axis = subplots(figsize=(6.5, 5.0))

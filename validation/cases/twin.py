@@ -36,7 +36,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _forces(parameters: str, where: str, measured_run: Result, steps: tuple[float, ...]) -> list[Row]:
-    """Force-excited by the wheel forces of a road-excited run, the samples held and linear."""
+    """Rows: runs driven by the wheel forces of a road-excited run, with samples held and interpolated linearly."""
     with TemporaryDirectory() as name:
         write_measurement(measured_run, Path(name), 2e-3)
         rows = []
@@ -49,7 +49,7 @@ def _forces(parameters: str, where: str, measured_run: Result, steps: tuple[floa
 @allowing("edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road")
 @allowing("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
 def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
-    """The measured course, 250 m at 50 m/s, and force-excited by the forces of its rough part."""
+    """Rows: runs on the measured course (250 m at 50 m/s), and runs driven by the wheel forces of its rough part."""
     data = data_folder()
     if data is None or not (data / COURSE).exists():
         reason = "TWINRIG_DATA names no folder with the measured course"
@@ -68,7 +68,7 @@ def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
 
 
 def _compare(title: str, scenes: list[Scene]) -> list[Row]:
-    """Rows of both engines: the largest difference to the reference over all scenes."""
+    """Rows for both engines: largest difference from the reference over all scenes."""
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)
     return [

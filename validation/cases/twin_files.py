@@ -69,7 +69,7 @@ def _exported(folder: Path, name: str) -> ModelFile:
 
 
 def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
-    """The worst of all builds."""
+    """Row: largest difference of accelerations from the model file, over all builds."""
     agreements = certificate(file.twin, QUICK_STATES if quick else STATES)
     worst: Agreement = max(agreements, key=lambda each: each.acceleration)
     return Observed(
@@ -83,7 +83,8 @@ def _agreement(name: str, file: ModelFile, quick: bool) -> Row:
 
 
 def _soft(folder: Path, name: str, text: str) -> Row:
-    """What MuJoCo's constraints give way, by the law of its documentation on the plain equations."""
+    """Row: accelerations with MuJoCo's soft constraints, compared with the law in MuJoCo's documentation applied to the
+    plain equations."""
     twin = _read(folder, name, text).twin
     states = states_of(twin, QUICK_STATES)
     apart = agreement("", reference(twin, states, SOFT), moved_at(softly_coupled(twin), states))
@@ -98,7 +99,7 @@ def _soft(folder: Path, name: str, text: str) -> Row:
 
 
 def _path(folder: Path) -> list[Row]:
-    """Paths over 1 s of the cart, and the balance of energy and work."""
+    """Rows: paths of the cart over 1 s, and its balance of energy and work."""
     report = paths(_read(folder, "cart", CART).twin)
     return [
         Observed(
@@ -119,7 +120,7 @@ def _path(folder: Path) -> list[Row]:
 
 
 def _planted(folder: Path, quick: bool) -> Row:
-    """How many of the planted differences are named first, with their size."""
+    """Row: number of planted differences that the comparison names first, with their right size."""
     first, named = _read(folder, "original", JOINTED).twin, 0
     chosen = PLANTED[::5] if quick else PLANTED
     for name, old, new, kind, owner, size in chosen:

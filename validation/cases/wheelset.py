@@ -57,13 +57,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _spread(values: Iterable[float]) -> float:
-    """Largest relative difference of any two."""
+    """Largest relative difference between any two values."""
     every = np.array(list(values))
     return float(np.ptp(every) / np.abs(every).max())
 
 
 def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
-    """Wavelength of each free wheelset: closed form, rails that are edges, implementations among each other."""
+    """Rows: wavelength of each free wheelset by closed form, with knife-edge rails, and in all implementations."""
     closed, edges, among = [], [], []
     for wheelset in wheelsets.values():
         waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATIONS}
@@ -99,7 +99,8 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
 
 
 def _critical_rows(speeds: Speeds) -> list[Row]:
-    """Critical speeds among each other: of those that have one, and whether all agree which those are."""
+    """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
+    wheelsets have one."""
     there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
     agreed = all(len(of_engine) in (0, len(IMPLEMENTATIONS)) for of_engine in there)
     having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATIONS)]
@@ -146,7 +147,7 @@ def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
 
 
 def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
-    """Accelerations at lively states by each engine against the equations."""
+    """Rows: accelerations of each engine at random moving states, compared with the reference equations."""
     draw, rows = np.random.default_rng(SEED), []
     for engine in ENGINES:
         worst = 0.0
@@ -170,13 +171,14 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
 
 
 def _speed_of_path(speeds: Speeds, name: str) -> float:
-    """Speed (m/s) of a path: above the critical one, 60 where there is none."""
+    """Speed (m/s) of a wheelset's path: above its critical speed, or 60 m/s if it has none."""
     critical = speeds[name]["reference"]
     return min(ABOVE * critical, 180.0) if critical is not None else 60.0
 
 
 def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> list[Row]:
-    """One second by RK4 with FASTSIM: states of the engines by the equations', and the power of creep forces."""
+    """Rows on paths of one second by RK4 with FASTSIM: differences between the implementations, and the sign of the
+    creep forces' power."""
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
@@ -218,13 +220,14 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
 
 
 def _step(equations: Equations) -> float:
-    """STEP, or a smaller one that divides DURATION, for the fastest motion."""
+    """Time step (s) for the wheelset's fastest motion: STEP, or a smaller one that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
     return DURATION / np.ceil(DURATION / min(STEP, 1.0 / fastest))
 
 
 def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, ...]) -> dict[str, dict[str, Orbit]]:
-    """Limit cycle of the chosen wheelset, and of those whose critical speed leaves room above, at half the step.
+    """Limit cycle of the chosen wheelset, and, at half the step, of those whose critical speed is low enough for a
+    speed above it.
 
     Each implementation finds it from 1 % beside.
     """
@@ -244,7 +247,8 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
 
 
 def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
-    """Amplitude and frequency: step-halving errors, and how far the engines are apart by these."""
+    """Rows on amplitude and frequency of the limit cycles: relative change by halving the step, and ratio of the
+    difference between the engines to it."""
     rows, count = list[Row](), len(cycles["chosen"])
     for value, error in (("amplitude", "error"), ("frequency", "frequency_error")):
         every = [[(getattr(o, value), getattr(o, error)) for o in of_engine.values()] for of_engine in cycles.values()]
@@ -282,8 +286,8 @@ def _order_row() -> Row:
 
 
 def _energy_rows() -> list[Row]:
-    """Rows: residual of the energy ledger of a path below the flanges, and how it falls with the step, by either
-    law."""
+    """Rows: error of the energy balance of a path without flange contact, and how it decreases with the step, for both
+    creep laws."""
     rows = list[Row]()
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
         equations = Equations(CHOSEN, 60.0, law, 11)  # type: ignore[arg-type]
@@ -311,7 +315,7 @@ def _energy_rows() -> list[Row]:
 
 
 def _fault_rows() -> list[Row]:
-    """Rows: changes of the figures above by a small fault in one implementation."""
+    """Rows: how much a small fault in one implementation changes the quantities of the other rows."""
     equations, engine = Equations(CHOSEN, 60.0), implementation("mujoco")(CHOSEN, 60.0)
     state = equations.displaced(3e-3)
     right = largest_relative_difference(engine.rates(state), equations.rates(state))

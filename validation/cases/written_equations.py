@@ -36,12 +36,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
-    """A row that compares plain equations with another implementation of the same laws."""
+    """Row that compares the plain equations with another implementation of the same laws."""
     return Observed(f"written.{id}", SYSTEM, quantity, value, unit).at_most(bound, WHY, "native")
 
 
 def _laws(states: int) -> list[Row]:
-    """The tyre's law, and what holds the design position."""
+    """Rows on the tyre's law, and on the preloads in the design position."""
     rows = [
         _row(
             "bristles",
@@ -70,7 +70,7 @@ def _laws(states: int) -> list[Row]:
 
 
 def _hubs(states: int, duration: float) -> list[Row]:
-    """Cut at their wheels."""
+    """Rows on vehicles that are cut at their wheels and driven by hub forces."""
     rows = []
     for name, car in cut_cars().items():
         for engine in ("reference", *ENGINES):

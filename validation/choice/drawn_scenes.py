@@ -14,19 +14,19 @@ TOLERANCES = (0.02, 0.005, 0.05)
 
 @dataclass(frozen=True)
 class ChoiceQuestion:
-    """A scene's table, and its question."""
+    """A random scene, as a table, with the quantities and tolerance of its choice."""
 
     table: dict[str, Any]
     quantities: tuple[str, ...]
     tolerance: float
 
     def scene(self) -> Any:
-        """The scene, built."""
+        """The scene, built from the table."""
         return import_module(SYSTEMS[self.table.get("system", "pitch-plane")].scene).build(self.table, "drawn")
 
 
 def draw_scene(system: str, seed: int) -> ChoiceQuestion:
-    """The scene of a system and a seed."""
+    """The random scene of a system for a seed."""
     draw = np.random.default_rng([SEED, seed])
     table, quantities = DRAWN[system](draw)
     return ChoiceQuestion(
@@ -38,7 +38,8 @@ SEED = 2210
 
 
 def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A half car on a road, with a pitch spring of any strength and a gyro; half of them start off their rest."""
+    """A random half car on a road, with a pitch spring of random strength and a gyro; half of them start away from
+    rest."""
     road = [
         {"source": "study", "speed": float(rng.uniform(8.0, 30.0))},
         {
@@ -61,7 +62,8 @@ def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, .
 
 
 def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """A wheelset below and above its critical speed, from small displacements to those that meet the flange."""
+    """A random wheelset scene at a speed below or above critical, with a displacement from small up to flange
+    contact."""
     factors = {name: float(np.exp(rng.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
     usual = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
     displacement = float(10.0 ** rng.uniform(-4.0, -2.2))

@@ -29,14 +29,14 @@ OMEGA = np.geomspace(1e-2, 3e5, 3000)
 
 
 def asked_speeds(drawn_scene: DrawnRide) -> Chooser:
-    """Of a range of speeds about that of the scene."""
+    """A chooser for a range of speeds about the scene's speed."""
     return Chooser(
         drawn_scene.scene, [share * drawn_scene.speed for share in RANGE], drawn_scene.quantities, drawn_scene.tolerance
     )
 
 
 def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
-    """Changes (quantities,) of the worst listed speed."""
+    """Changes (quantities,) at the speed at which they are largest, by frequency responses."""
     left = without(chooser.scene, choice.left_out)
     ratios = [
         _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
@@ -46,14 +46,16 @@ def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
 
 
 def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
+    """Variances (quantities,) from sums over frequencies with the matrices M, D, K. No state space is built, so that M
+    may be singular."""
     rest = full_scene.reduced(scene)
     densities = spectra(rest.vehicle, rest.excitation, full_scene.speed, OMEGA)[:, rows]
     return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 
 def worst_nearby(chooser: Chooser, omitted_effects: Set, draws: int, seed: int) -> float:
-    """Largest change, by the tolerance, at random speeds of the range and with every parameter off at random."""
+    """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
+    parameters."""
     random, rest, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
     names = parameters(chooser.scene.vehicle)
@@ -67,7 +69,8 @@ def worst_nearby(chooser: Chooser, omitted_effects: Set, draws: int, seed: int) 
 
 
 def measured_step(chooser: Chooser, omitted_effects: Set) -> float:
-    """Longest step (s) that keeps the tolerance, by the covariance of what runs sample; no quantity is weighted."""
+    """Longest step (s) with which runs keep the tolerance, by the covariance of their sampled states; for quantities
+    without weighting."""
     return longest_step(
         [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact(), chooser.tolerance
     )
@@ -75,8 +78,8 @@ def measured_step(chooser: Chooser, omitted_effects: Set) -> float:
 
 @dataclass(frozen=True)
 class JudgedByRuns:
-    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice; of rides, on
-    fresh roads and less what chance may add there."""
+    """A scene, its choice, and the changes (quantities,) that two further runs show. For rides these use new roads, and
+    the changes are the smallest that are significant."""
 
     system: str
     engine: str
@@ -86,12 +89,12 @@ class JudgedByRuns:
 
     @property
     def honest(self) -> bool:
-        """Whether no tolerance is broken that was reported as kept."""
+        """False if the choice claims to keep the tolerance and the further runs break it."""
         return not self.choice.within_tolerance or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
 
 
 def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns:
-    """Choose, and run the scene and what is left once more."""
+    """Choose effects, then run the complete and the reduced scene once more."""
     chooser = ChooserByRuns(request.scene(), engine, list(request.quantities), request.tolerance)
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
@@ -101,7 +104,8 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
 
 
 def change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:
-    """Worst case: rms of the difference where both have a row, by the path's deviation, or a number's by its size."""
+    """Largest relative change over the cases: rms difference at common rows divided by the path's standard deviation,
+    or by the magnitude of a single number."""
     worst = 0.0
     for full, left in zip(full_cases, reduced_cases, strict=True):
         rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)

@@ -24,13 +24,13 @@ ROUNDS = 5
 
 
 def whole_car() -> RideScene:
-    """The scene."""
+    """Scene of a car with 19 degrees of freedom, for which a choice is made."""
     return build(ASKED_SCENE, "a car of 19 degrees of freedom")
 
 
 def price_of_choice() -> tuple[tuple[float, float, float], float]:
-    """Ratio of a choice's processor time to that of the full covariance with its error, with a 95 % interval, and of
-    the time that was told beforehand to the choice's."""
+    """Ratio of the processor time of a choice to that of the full covariance with its error, with a 95 % interval; and
+    ratio of the predicted to the actual time of a choice."""
     scene = whole_car()
 
     def choose() -> None:

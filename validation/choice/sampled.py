@@ -24,7 +24,7 @@ SHARES = (0.0, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Sampled:
-    """Runs of ``march``, whose quantities have no weightings, in steps (s)."""
+    """Statistics of sampled runs of ``march`` in steps (s); its quantities must have no weightings."""
 
     march: March
     step: float = 0.0
@@ -35,7 +35,7 @@ class Sampled:
         return self.march.longest
 
     def deviations(self, step: float) -> np.ndarray:
-        """Standard deviations (q,) of the quantities at the steps (s) of a run."""
+        """Standard deviations (q,) of the quantities at the samples of a run in steps of ``step`` (s)."""
         assert not self.march.weightings
         run, axles = replace(self, step=step), range(len(self._delays))
         total = np.zeros(len(self.march.rows))
@@ -45,7 +45,7 @@ class Sampled:
         return np.sqrt(total)
 
     def _shared(self, i: int, j: int) -> np.ndarray:
-        """Covariances (q,) of what axle i moves with what axle j moves."""
+        """Covariances (q,) between the responses of the quantities to the road at axle i and at axle j."""
         seen, (by_i, by_j), late = self.march.motions[1], (self._by_road(i), self._by_road(j)), self._axle_lag(i, j)
         motions = np.einsum("ql,lm,qm->q", seen, self._motions(i, j), seen.conj())
         with_road = np.einsum("ql,lm,qm->q", seen, self._with_road(i, late), by_j)
@@ -54,7 +54,7 @@ class Sampled:
         return (motions + with_road + back + road).real
 
     def _axle_lag(self, i: int, j: int) -> float:
-        """Time (s) by which the road of axle j is ahead of that of axle i."""
+        """Time (s) by which the road at axle j is ahead of the road at axle i."""
         return self._delays[i] - self._delays[j]
 
     @cached_property
@@ -63,7 +63,7 @@ class Sampled:
 
     @cached_property
     def _rate(self) -> np.ndarray:
-        """Rate matrix of the road filters in time (m, m), 1/s."""
+        """System matrix (m, m) in 1/s of the road filters, as functions of time."""
         return self.march.speed * self.march.reduced.excitation.F
 
     @cached_property
@@ -73,7 +73,7 @@ class Sampled:
         return solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T)
 
     def _road(self, delay: float) -> np.ndarray:
-        """S (m, m): the filters by themselves ``delay`` seconds before."""
+        """S (m, m): covariance of the filter states with those ``delay`` seconds before."""
         if delay < 0:
             return self._road(-delay).T
         return expm(self._rate * delay) @ self._variance
@@ -86,12 +86,12 @@ class Sampled:
 
     @cached_property
     def _motion_covariance(self) -> np.ndarray:
-        """R (n,) of the motions."""
+        """R (n,): factor by which the Runge-Kutta method multiplies each modal coordinate in a step."""
         z = self.step * self.march.motions[0]
         return 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
 
     def _input_matrix(self, axle: int) -> list[np.ndarray]:
-        """B (n, m) by share of the step."""
+        """B (n, m) for each stage of a step: how the filter states drive the modal coordinates."""
         rates, _, forced = self.march.motions
         h, z, m, road = self.step, (self.step * rates)[:, None], len(self._rate), self.march.reduced.excitation
         axles = len(road.heights)
@@ -108,12 +108,14 @@ class Sampled:
         ]
 
     def _driven(self, axle: int, delay: float) -> np.ndarray:
-        """A step's forces (n, m) by the filters ``delay`` seconds after the step begins, in the axle's own time."""
+        """Covariance (n, m) of a step's forcing with the filter states ``delay`` seconds after the step's start, in the
+        axle's own time."""
         parts = zip(self._input_matrix(axle), SHARES, strict=True)
         return sum(B @ self._road(share * self.step - delay) for B, share in parts)
 
     def _with_road(self, axle: int, delay: float) -> np.ndarray:
-        """x of an axle by the filters that it meets ``delay`` seconds later (n, m); before, where that is negative."""
+        """Covariance (n, m) of an axle's response x with the filter states that it meets ``delay`` seconds later, or
+        earlier if negative."""
         steps = max(int(np.ceil(-delay / self.step)), 0)
         begin = delay + steps * self.step
         value, given = self._state_by_filters(axle) @ expm(self._rate.T * begin), np.zeros(())
@@ -124,7 +126,7 @@ class Sampled:
         return value
 
     def _state_by_filters(self, axle: int) -> np.ndarray:
-        """x of an axle by the filters that it meets at that time (n, m)."""
+        """Covariance (n, m) of an axle's response x with the filter states that it meets at the same time."""
         kept, given = expm(self._rate.T * self.step), self._driven(axle, self.step)
         return np.array(
             [
@@ -134,7 +136,7 @@ class Sampled:
         )
 
     def _motions(self, i: int, j: int) -> np.ndarray:
-        """x of axle i by x of axle j (n, n)."""
+        """Covariance (n, n) of the responses x to axles i and j."""
         given = self._motion_covariance[:, None] * self._state_by_forces(i, j)
         given += (self._motion_covariance[:, None] * self._state_by_forces(j, i)).conj().T
         given += sum(
@@ -144,7 +146,7 @@ class Sampled:
         return given / (1 - self._motion_covariance[:, None] * self._motion_covariance.conj())
 
     def _state_by_forces(self, i: int, j: int) -> np.ndarray:
-        """x of axle i at a step's begin by the forces of axle j in that step (n, n)."""
+        """Covariance (n, n) of the response x to axle i at a step's start with the forcing by axle j in this step."""
         return np.asarray(
             sum(
                 self._with_road(i, self._axle_lag(i, j) + share * self.step) @ B.conj().T

@@ -9,7 +9,8 @@ LEVEL = 0.999
 
 
 def mean_square(observed: Observed, expected: float, freedom: int, why: str) -> Row:
-    """Row for a mean square of ``freedom`` independent normal numbers whose variance should be ``expected``.
+    """Row for a mean square of ``freedom`` independent normal values with the variance ``expected``, by the chi-square
+    distribution.
 
     freedom times value by expected is chi-square with that many degrees of freedom; the row passes inside the
     central band of LEVEL, and says how wide that is.

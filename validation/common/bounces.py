@@ -22,7 +22,7 @@ Pair = tuple[int, int]
 
 
 class Bounces:
-    """One vehicle; ``step`` (s) between the rows of a path, in which no tyre changes its state twice."""
+    """Exact path of a bouncing vehicle. A tyre must not switch twice within the ``step`` (s) between two rows."""
 
     def __init__(self, assembly: Assembly, step: float) -> None:
         vehicle, self.p, self.step = assembly.vehicle, assembly.parameters, step
@@ -36,7 +36,7 @@ class Bounces:
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
 
     def path(self, start: np.ndarray, count: int) -> np.ndarray:
-        """States (count + 1, 8) from the first (8,), every ``step`` seconds."""
+        """States (count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
         states = [np.append(start, 1.0)]
         for _ in range(count):
             states.append(self._state_after_step(states[-1]))
@@ -53,7 +53,7 @@ class Bounces:
             left, states = left - passed, self._states(x)
 
     def _switch(self, x: np.ndarray, states: Pair, longest: float) -> tuple[float, np.ndarray]:
-        """Time (s) after which a tyre leaves its state, and the state of the vehicle just then."""
+        """Time (s) at which a tyre changes its contact state, and the vehicle's state at that time."""
         before, after = 0.0, longest
         for _ in range(BISECTIONS):
             middle = 0.5 * (before + after)
@@ -64,7 +64,7 @@ class Bounces:
         return after, expm(self.rates[states] * after) @ x
 
     def _states(self, x: np.ndarray) -> Pair:
-        """States of contact of each tyre."""
+        """Contact state of each tyre."""
         p = self.p
         return _state(p.k1 * x[0], p.d1 * x[4]), _state(p.k2 * x[1], p.d2 * x[5])
 
@@ -76,7 +76,7 @@ def _state(spring: float, damper: float) -> int:
 
 
 def _laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
-    """Stiffness (N/m) and damping (N s/m) of both tyres in these states."""
+    """Stiffness (N/m) and damping (N s/m) of both tyres in their contact states."""
     laws = [((0.0, 0.0), (k, d), (2.0 * k, 0.0)) for k, d in ((p.k1, p.d1), (p.k2, p.d2))]
     return [law[state] for law, state in zip(laws, states, strict=True)]
 
@@ -84,7 +84,7 @@ def _laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
 def _rates(
     mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, laws: list[tuple[float, float]]
 ) -> np.ndarray:
-    """A (9, 9) of x' = A x, x the state with a last entry of 1."""
+    """Matrix A (9, 9) of x' = A x, where x is the vehicle's state followed by 1."""
     a, inverse = np.zeros((9, 9)), 1.0 / mass.diagonal()
     extra_k, extra_d = (np.diag([*(law[i] for law in laws), 0.0, 0.0]) for i in range(2))
     a[:4, 4:8] = np.eye(4)
@@ -94,7 +94,8 @@ def _rates(
 
 
 def energy(assembly: Assembly, states: np.ndarray) -> np.ndarray:
-    """Energy (m,) in J of states (m, 8) on the flat road: of motion, weight, suspension and pressed tyres."""
+    """Energy (m,) in J of states (m, 8) on a flat road: sum of kinetic energy, weight, suspension and compressed
+    tyres."""
     p, vehicle = assembly.parameters, assembly.vehicle
     z, v = states[:, :3], states[:, 4:]
     pitch = np.sin(states[:, 3]) if vehicle.geometry == "exact" else states[:, 3]

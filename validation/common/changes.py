@@ -19,7 +19,8 @@ Change = Saved
 
 
 def read_results(path: Path) -> Saved:
-    """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
+    """Rows by id, and provenance, of an earlier ``results.json`` (or of the folder with it); raises InputError for
+    other files."""
     file = path / "results.json" if path.is_dir() else path
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -34,14 +35,14 @@ def read_results(path: Path) -> Saved:
 
 
 def _told(error: Exception) -> str:
-    """What is wrong with a file that was read, in words."""
+    """Text on what is wrong with a file that was read."""
     if isinstance(error, json.JSONDecodeError):
         return f"line {error.lineno} is no JSON"
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _rows(content: Saved) -> dict[str, Saved]:
-    """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
+    """Rows by id; raises ValueError if two rows have the same id, because only one of them would be compared."""
     saved = map(of_saved, content["rows"])
     rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
     if len(rows) < len(content["rows"]):
@@ -50,13 +51,14 @@ def _rows(content: Saved) -> dict[str, Saved]:
 
 
 def _provenance(content: Saved) -> Saved:
-    """Where the rows are from, its tables as tables."""
+    """Provenance of the rows, as tables."""
     kept = dict(content["provenance"])
     return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
 
 
 def against(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
-    """The comparison with an earlier report for ``results.json``: its source, notes, all changes.
+    """Comparison with an earlier report, for ``results.json``: the earlier file and commit, notes, and all changed
+    rows.
 
     source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
     """
@@ -73,7 +75,7 @@ def against(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
 
 
 def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
-    """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
+    """Versions, seeds, Python, machine and system in which both reports differ, in the order of the earlier report."""
     for name in ("versions", "seeds"):
         old, new = was.get(name) or {}, source.get(name) or {}
         yield from (
@@ -89,7 +91,8 @@ def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any
 
 
 def changes(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -> list[Change]:
-    """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
+    """Changed rows by id, sorted by KINDS; rows with changed values are sorted by their change as a share of the
+    tolerance, largest first."""
     listed = [
         change
         for id in (*earlier_rows, *(id for id in later_rows if id not in earlier_rows))
@@ -143,7 +146,7 @@ def _differ(old: Any, new: Any) -> bool:
 
 
 def _size(old: Saved, new: Saved) -> float:
-    """Change of the value as a share of the tolerance, or of the value where there is none; 0 if only rounding."""
+    """Change of a value as a share of its tolerance, or of the value if there is no tolerance; 0 for mere rounding."""
     was, now, tolerance = old["value"], new["value"], new["tolerance"]
     if not _differ(was, now):
         return 0.0

@@ -32,7 +32,7 @@ def engine(name: str) -> Make:
 
 
 def random_states(count: int = 100) -> np.ndarray:
-    """The states (count, 8) of the audit, the same ones every time."""
+    """The random states (count, 8) at which accelerations are compared; the same at every call."""
     return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * SPREAD
 
 
@@ -46,14 +46,14 @@ def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, sta
 
 
 def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
-    """Largest difference to the equations of the paper, relative to the largest acceleration."""
+    """Largest difference from the accelerations of the paper's equations, relative to the largest acceleration."""
     states = random_states(count)
     hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
     return relative(accelerations(make_engine, assembly, settings, states), hand)
 
 
 def relative(computed: np.ndarray, hand: np.ndarray) -> float:
-    """Largest difference by the largest magnitude."""
+    """Largest difference divided by the largest expected magnitude."""
     return float(np.abs(computed - hand).max() / np.abs(hand).max())
 
 
@@ -75,7 +75,8 @@ def trajectory_gap(make_engine: Make, assembly: Assembly, settings: Settings) ->
 
 
 def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
-    """Largest difference of any state at common times; ``other_trajectory`` may be finer by a whole factor."""
+    """Largest difference of any state at common times; ``other_trajectory`` may have a time step smaller by an integer
+    factor."""
     if path is None:
         return float("inf")
     every = (len(other_trajectory.times) - 1) // (len(path.times) - 1)
@@ -83,7 +84,7 @@ def state_gap(path: Trajectory | None, other_trajectory: Trajectory) -> float:
 
 
 def order_gap(make_engine: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
-    """Difference between observed and declared order, from the settings' step and its half.
+    """Difference between observed and declared order of convergence, from runs at the settings' step and at half of it.
 
     ``truth`` is a path of the reference over the same time at a step finer by a whole factor.
     """
@@ -100,7 +101,7 @@ def observed_order(make_engine: Make, assembly: Assembly, settings: Settings, tr
 
 
 def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Largest distance by which any state moves away from the closed form of the static equilibrium on a flat road.
+    """Largest distance that any state moves away from the static equilibrium (closed form) on a flat road.
 
     ``assembly`` is the vehicle on its tyres with nothing that drives it.
     """
@@ -112,7 +113,8 @@ def equilibrium_gap(make_engine: Make, assembly: Assembly, settings: Settings) -
 
 
 def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
-    """Change of the vertical momentum against weight minus wheel forces over time, relative to weight times time.
+    """Error of the vertical momentum balance, relative to weight times time: change of momentum compared with the
+    integral of weight minus wheel forces.
 
     An invariant of any vehicle under prescribed wheel forces, whatever its suspension does; exact under
     RK4 for forces that are constant or linear over each step. Needs no second implementation.
@@ -148,10 +150,10 @@ def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> f
 
 
 def by_hand(settings: Settings) -> Settings:
-    """The reference's classical Runge-Kutta settings with the step and duration of others."""
+    """Settings for the reference's classical Runge-Kutta method with the step and duration of the given ones."""
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
 def largest_relative_difference(computed: Any, expected: Any) -> float:
-    """Largest difference by the largest."""
+    """Largest difference divided by the largest expected magnitude."""
     return float(np.abs(np.asarray(computed) - expected).max() / np.abs(expected).max())

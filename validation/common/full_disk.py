@@ -22,7 +22,7 @@ MOMENTS = 20
 
 @contextmanager
 def files_of_at_most(size: int) -> Iterator[None]:
-    """No file of this process grows beyond ``size`` bytes."""
+    """Context in which no file of this process can grow beyond ``size`` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -32,7 +32,7 @@ def files_of_at_most(size: int) -> Iterator[None]:
 
 
 def damage(folder: Path) -> int:
-    """Number of moments at which a broken file was left, or no error of the operating system was reported."""
+    """Number of moments of a full disk at which a broken file remained, or no system error was reported."""
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
     _save(result, folder / "whole")

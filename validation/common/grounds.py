@@ -22,7 +22,7 @@ ANY_ASSUMPTION = ""
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke; ``why`` it may, "" where nobody allowed it."""
+    """An assumption that a run broke. ``why``: reason why this is allowed, "" if it is not."""
 
     run: str
     broken: BrokenAssumption
@@ -31,7 +31,7 @@ class Breach:
 
 @dataclass
 class Grounds:
-    """Breaches since the last rows; whether rows rest on them already; the part of the case that has run and rows."""
+    """Broken assumptions of the runs since the last rows were made, and whether rows rest on them already."""
 
     breaches: list[Breach] = field(default_factory=list)
     rested: bool = False
@@ -39,7 +39,7 @@ class Grounds:
     closed: bool = False
 
     def note(self, run: Result) -> None:
-        """Take in a result that was judged."""
+        """Record the broken assumptions of a result."""
         if self.rested:
             self.breaches, self.rested, self.closed = [], False, False
         self.part = _instruction_index()
@@ -48,13 +48,14 @@ class Grounds:
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def rest(self, allowed: bool) -> str:
-        """Text of the broken assumptions that the current row rests on, with or without leave."""
+        """Text on the broken assumptions on which the current row rests: the allowed ones, or those that are not."""
         same_part = self.part == _instruction_index()
         self.rested, self.closed = True, self.closed or same_part
         return "" if self.closed and not same_part else self.told(allowed)
 
     def told(self, allowed: bool) -> str:
-        """Each assumption that was broken once, with or without leave: how often, the longest share, and why it may."""
+        """Text on each broken assumption (allowed or not): number of runs, longest share of time, and why it is
+        allowed."""
         by_name: dict[str, list[Breach]] = {}
         for each in self.breaches:
             if bool(each.why) == allowed:
@@ -76,8 +77,8 @@ Answer = TypeVar("Answer")
 
 
 def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
-    """A case's answer, with the broken assumptions of its runs in its rows; and those that runs after its last row
-    broke without leave."""
+    """Rows of a case with the broken assumptions of its runs, and the assumptions that were broken without permission
+    after its last row."""
     grounds = Grounds()
     before = _GROUNDS.set(grounds)
     try:
@@ -89,7 +90,7 @@ def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
 
 
 def _instruction_index() -> int:
-    """Index of the instruction of ``measure`` that is at work; ``measure`` may be decorated."""
+    """Index of the bytecode instruction that ``measure`` is executing, also if ``measure`` is decorated."""
     frame, outer = sys._getframe(), sys._getframe()
     while frame.f_back is not None and frame.f_code is not measured.__code__:
         outer = outer if frame.f_globals["__name__"] == "contextlib" else frame
@@ -99,7 +100,7 @@ def _instruction_index() -> int:
 
 @contextmanager
 def allowing(why: str, *names: str) -> Iterator[None]:
-    """Runs that are made inside may break these assumptions, or any where none is named; decorates functions, too."""
+    """Context in which runs may break the named assumptions, or any if none is named; it can decorate a function."""
     before = _ALLOWED.set(_ALLOWED.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), why))
     try:
         yield
@@ -108,12 +109,12 @@ def allowing(why: str, *names: str) -> Iterator[None]:
 
 
 def broken() -> str:
-    """Broken assumptions without leave that the current row rests on."""
+    """Broken assumptions that are not allowed and on which the current row rests."""
     grounds = _GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=False)
 
 
 def allowed() -> str:
-    """Broken assumptions with leave that the current row rests on."""
+    """Allowed broken assumptions on which the current row rests."""
     grounds = _GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=True)

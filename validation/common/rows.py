@@ -51,14 +51,14 @@ class Row:
     allowed: str = field(default_factory=grounds.allowed)
 
     def grounded(self) -> "Row":
-        """The row, failed where it rests on an assumption that was broken without leave."""
+        """The row; its status is "failed" if it rests on an assumption that was broken without permission."""
         if not self.broken or self.status == "not run":
             return self
         reason = f"{self.reason}; rests on a broken assumption: {self.broken}".removeprefix("; ")
         return replace(self, status="failed", reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
-        """The row as ``results.json`` keeps it."""
+        """The row in the form for ``results.json``."""
         return asdict(self)
 
 
@@ -82,7 +82,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Observed:
-    """A figure before it is judged; each method gives the row of one way to judge it.
+    """A measured value before it is judged; each method makes a row with one kind of verdict.
 
     id : name of the row, which begins with the name of its case.
     system, quantity : system that the figure belongs to, and in words what was measured.
@@ -150,12 +150,12 @@ def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
 
 
 def failed(id: str, quantity: str, reason: str) -> Row:
-    """Row of what gave no figure, or rests on what it must not."""
+    """Row for a case that gave no value, or whose value rests on a broken assumption."""
     return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
 
 
 def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
-    """A case's answer, whose rows fail if they rest on an assumption that was broken without leave.
+    """Rows of a case, failed if they rest on an assumption that was broken without permission.
 
     What runs after the last row broke has a row of its own.
     """
@@ -167,7 +167,7 @@ def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
 
 
 def of_saved(row: dict[str, Any]) -> dict[str, Any]:
-    """A row of saved results; older reports called "passed" what they did not judge, and knew no assumptions."""
+    """Row from saved results; older reports used "passed" for rows without verdict, and had no assumptions."""
     unjudged = row["status"] == "passed" and row["reason"] == "reported, not judged"
     row = {"broken": "", "allowed": "", **row}
     return row | {"status": "reported", "reason": ""} if unjudged else row

@@ -20,7 +20,8 @@ COURSE = "detrended_rms_course_2in.crg"
 
 
 def on_paper_road() -> ContextDecorator:
-    """Leave for runs of the paper's vehicle, on its road or on its wheel forces, to break named assumptions."""
+    """Context in which runs of the paper's vehicle, on its road or under its wheel forces, may break certain
+    assumptions."""
     why = "the paper's linear tyres pull or lie on their rims at times on its road, on both sides of a comparison alike"
     return allowing(why, "tyres press", "springs compressed", "tyres not flat")
 
@@ -32,7 +33,7 @@ def road_scene(
     road: dict[str, Any] | None = None,
     folder: Path = Path(),
 ) -> Scene:
-    """The vehicle on a road, the study road unless another is given."""
+    """Scene of the vehicle on a road; the study road by default."""
     return build(
         {
             "title": "validation",
@@ -53,7 +54,8 @@ def drive(
     parameters: str = "itwm_drift",
     road: dict[str, Any] | None = None,
 ) -> Result:
-    """The virtual measurement on a road, in the reference: its files, sampled every ``period`` (s), in the folder."""
+    """Virtual measurement on a road in the reference; its files, sampled every ``period`` (s), are written to the
+    folder."""
     measured = run(road_scene(parameters, step, duration, road), "reference")
     write_measurement(measured, folder, period)
     return measured
@@ -68,7 +70,7 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """The vehicle driven by the forces that ``drive`` left in the folder."""
+    """Scene of the vehicle driven by the wheel forces that ``drive`` wrote to the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {

@@ -14,7 +14,7 @@ from validation.common.scenes import road_scene
 
 
 class Right:
-    """An integrator that keeps its tolerance."""
+    """An outside integrator without a fault, which keeps its tolerance."""
 
     order, adaptive = 8, True
 
@@ -30,29 +30,29 @@ class Right:
         return self.told(solution.y.T)
 
     def weighed(self, rate: np.ndarray) -> np.ndarray:
-        """Rates (8,) as they are integrated."""
+        """Time derivatives (8,) that the integrator uses; faulty subclasses change them."""
         return rate
 
     def told(self, states: np.ndarray) -> np.ndarray:
-        """States (n, 8) that the engine reports."""
+        """States (n, 8) that the integrator returns; faulty subclasses change them."""
         return states
 
 
 class Still(Right):
-    """A wrong engine whose vehicle stays where it begins."""
+    """Faulty integrator: the vehicle stays in its initial state."""
 
     def told(self, states: np.ndarray) -> np.ndarray:
-        """The start, at all times."""
+        """The initial state at all times."""
         return np.tile(states[0], (len(states), 1))
 
 
 class Boastful:
-    """Explicit Euler that states order 4."""
+    """Faulty integrator: explicit Euler that declares order 4."""
 
     order, adaptive = 4, False
 
     def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
-        """A step of Euler between each two times."""
+        """States by one Euler step between each two times."""
         states = [start]
         for begin, end in pairwise(times):
             states.append(states[-1] + (end - begin) * f(begin, states[-1]))
@@ -60,18 +60,18 @@ class Boastful:
 
 
 class Swapped(Right):
-    """Front and rear wheel exchanged in the answer."""
+    """Faulty integrator: front and rear wheel are exchanged in the result."""
 
     def told(self, states: np.ndarray) -> np.ndarray:
-        """The states, two columns of which are exchanged."""
+        """States with two columns exchanged."""
         return states[:, [1, 0, 2, 3, 5, 4, 6, 7]]
 
 
 class Weak(Right):
-    """Every force 1 % too small."""
+    """Faulty integrator: all forces are 1 % too small."""
 
     def weighed(self, rate: np.ndarray) -> np.ndarray:
-        """Accelerations that are 1 % smaller."""
+        """Time derivatives with accelerations 1 % too small."""
         return np.array([1.0] * 4 + [0.99] * 4) * rate
 
 
@@ -79,7 +79,7 @@ WRONG_ENGINES = (Still, Boastful, Swapped, Weak)
 
 
 def passed(kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
-    """Names of the integrators whose run on a road ends without a word against it."""
+    """Names of the integrators whose run on a road ends without an error being raised."""
     tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
     before = [dict(table) for table in tables]
     try:

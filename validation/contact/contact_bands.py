@@ -34,7 +34,8 @@ FASTSIM = [
 
 @dataclass(frozen=True)
 class TheoryErrors:
-    """A theory against the exact one: force (n, 2) divided by mu N, moment (n,) divided by mu N times the lever.
+    """Forces and errors of a theory relative to the exact one: force (n, 2) divided by mu N, moment (n,) divided by mu
+    N times the lever arm.
 
     error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
     ``groups``.
@@ -49,22 +50,22 @@ class TheoryErrors:
 
     @property
     def used(self) -> Array:
-        """Size of the force, (n,)."""
+        """Magnitude (n,) of the force divided by mu N."""
         return np.linalg.norm(self.force, axis=1)
 
     @property
     def used_with_moment(self) -> Array:
-        """Size of force and moment, (n,)."""
+        """Magnitude (n,) of force and moment together."""
         return used_with_moment(self.used, self.moment)
 
     def of(self, mask: Array) -> "TheoryErrors":
-        """Some of the contacts, by a mask (n,)."""
+        """The contacts that a mask (n,) selects."""
         return TheoryErrors(*(getattr(self, part.name)[mask] for part in fields(self)))
 
 
 def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
-    """Force divided by mu N and moment divided by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or
-    "simplified"."""
+    """Forces (n, 3) of a theory, FASTSIM or "simplified": force divided by mu N, and moment divided by mu N and the
+    longer semi-axis."""
     axes, motions = _arrays(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":
@@ -88,9 +89,8 @@ def _arrays(cases: list[ContactCase]) -> tuple[Array, Array]:
 
 
 def groups(cases: list[ContactCase]) -> Array:
-    """Number (n,) of the group of each contact, of which theories err in different ways: by Poisson's ratio, whether
-    spin is against the lateral creepage, and whether the ellipse is longer across the rolling direction.
-    """
+    """Group number (n,) of each contact. Groups, in which theories have different errors, differ in Poisson's ratio, in
+    spin with or against the lateral creepage, and in ellipses longer along or across the rolling direction."""
     kinds = [(c.pair.nu, c.parts[1] * c.parts[2] < 0, c.a < c.b) for c in cases]
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
@@ -107,7 +107,8 @@ def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS) -> Th
 
 
 def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
-    """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
+    """Shares of contacts whose errors of force and of moment are within those that ``models.contact.accuracy``
+    states."""
     moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
         float(np.mean(constant.error <= band(name, constant.used, constant.spinning))),
@@ -116,7 +117,8 @@ def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
 
 
 def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
-    """Quantiles of the error at each knot, without spin and with it, of the group with the largest."""
+    """Quantiles of the error at each knot, of the group of contacts with the largest; one list without spin and one
+    with spin."""
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
     kinds = theory.spinning < 0.5, theory.spinning >= 0.5
@@ -124,7 +126,8 @@ def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[floa
 
 
 def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
-    """Largest quantile of a group with more than a few contacts; of all together where none has them."""
+    """Largest quantile over the groups with enough contacts, or the quantile over all contacts if no group has
+    enough."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
     told = [part for part in parts if part.size >= FEWEST_OF_GROUP] or [error[rows]]
     return max(float(np.quantile(part, KNOWN_SHARE)) for part in told)

@@ -26,7 +26,8 @@ LINES = {1: ":", WHEELS: "-", 8: "--"}
 
 
 def figure(points: list[dict[str, Any]]) -> Figure:
-    """Cost per step over the law; shares of engine, kernel and bridge over the law and over the number of wheels."""
+    """Figure of the cost per step for each contact law, and of the shares of engine, kernel and bridge by law and by
+    number of wheels."""
     drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(COLUMN_WIDTH, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
@@ -48,7 +49,7 @@ def _main(engine: str) -> str:
 
 
 def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
-    """Lines of the best bridge at every number of wheels, marks of the others."""
+    """Plot a line of the best bridge for each number of wheels, and marks for the other bridges."""
     for engine in METHODS:
         of_engine = [p for p in points if p["engine"] == engine]
         for count, style in LINES.items():
@@ -76,7 +77,8 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
 
 
 def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
-    """A bar of 100 % for each; the parts of a bar are of its whole, none below zero."""
+    """Draw a bar of 100 % for each point, made of the shares of engine, kernel and bridge; negative shares count as
+    zero."""
     labels, before = [label for label, _ in points], np.zeros(len(points))
     whole = np.array([sum(max(p[part], 0.0) for part, _, _ in PARTS) for _, p in points])
     for part, name, colour in PARTS:

@@ -49,17 +49,18 @@ Ends = tuple[float, float]
 
 
 def cases() -> list[ContactCase]:
-    """All contacts of the set, without their forces."""
+    """All contacts of the regular set, with no forces computed."""
     return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
 
 
 def drawn_contacts(part_number: int) -> list[ContactCase]:
-    """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
+    """One part of the randomly drawn contacts, with no forces computed; all directions of the scaled creepages are
+    equally likely."""
     return _draw_contacts(part_number, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part_number}", [PAIR])
 
 
 def wide_contacts(part_number: int) -> list[ContactCase]:
-    """A part of the wide contacts, without their forces."""
+    """One part of the contacts with wide ranges of shape and material, with no forces computed."""
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
     pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED]) * part_number
     streams = enumerate(WIDE_CONTACTS[part_number], first)
@@ -73,7 +74,8 @@ def wide_contacts(part_number: int) -> list[ContactCase]:
 def _draw_contacts(
     stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[MaterialPair], absent: float = 0.0
 ) -> list[ContactCase]:
-    """Contacts of a stream of numbers, of pairs in turn; each creepage is absent in a share of them, but never all."""
+    """Random contacts from a stream of numbers, with the material pairs in turn. Each creepage is zero in a share of
+    the contacts, but never all three."""
     rng = np.random.default_rng((SEED, stream))
     ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, sizes))
     directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent
@@ -88,19 +90,19 @@ def _axes(ratio: float) -> tuple[float, float]:
 
 
 def read_contacts() -> list[ContactCase]:
-    """All contacts of the set with their forces."""
+    """All contacts of the regular set, with their stored forces."""
     return _read(FILE, cases())
 
 
 def read_drawn(part_number: int) -> list[ContactCase]:
-    """A part of the drawn contacts with their forces."""
+    """One part of the randomly drawn contacts, with their stored forces."""
     return _read(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))[
         part_number * DRAWN : (part_number + 1) * DRAWN
     ]
 
 
 def read_wide(part_number: int) -> list[ContactCase]:
-    """A part of the wide contacts with their forces."""
+    """One part of the contacts with wide ranges, with their stored forces."""
     return _read(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))[part_number * sum(WIDE_CONTACTS[FITTED]) :][
         : sum(WIDE_CONTACTS[part_number])
     ]
@@ -114,7 +116,7 @@ def _read(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
 
 
 def write(path: Path, contacts: list[ContactCase]) -> None:
-    """Compute the forces of all contacts asked for."""
+    """Compute and write the forces of the given contacts."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("ratio", "kind", "level", *ANSWERS))

@@ -36,7 +36,8 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Shape:
-    """A distance, a load (N), and the rectangle x0, x1, y0, y1 (m) of the exact grid, None to find it."""
+    """Undeformed distance of two bodies, load (N), and rectangle x0, x1, y0, y1 (m) for the exact grid (None: to be
+    found)."""
 
     name: str
     distance: Distance
@@ -45,7 +46,7 @@ class Shape:
 
 
 def _shape_of_formula(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
-    """A shape from a formula, its exact contact within -x..x and -y..y."""
+    """A shape given by a formula, whose exact contact area lies within -x..x and -y..y."""
     distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
     return Shape(name, distance, load, (-x, x, -y, y))
 
@@ -55,7 +56,8 @@ def _hertz(name: str, ratio: float, x: float, y: float) -> Shape:
 
 
 def _two_grooves(name: str, ridge: float, load: float, half: float = 3e-3, tilt: float = 0.0) -> Shape:
-    """Two grooves ``half`` (m) to each side of the middle, a ridge (m) between, one of them ``tilt`` (m) higher."""
+    """Two parallel grooves at a distance ``half`` (m) on both sides of the middle, with a ridge (m) between; one is
+    ``tilt`` (m) higher."""
     return _shape_of_formula(
         name,
         lambda u, v: CURVATURE * u**2 + ridge * ((v / half) ** 2 - 1.0) ** 2 + tilt * (v / half + 1.0) / 2.0,
@@ -66,7 +68,7 @@ def _two_grooves(name: str, ridge: float, load: float, half: float = 3e-3, tilt:
 
 
 def formulas() -> list[Shape]:
-    """Distances from formulas."""
+    """Shapes whose distance is given by a formula."""
     apart = 8e-3
     return [
         _hertz("circle", 1.0, 0.0078, 0.0078),
@@ -87,7 +89,8 @@ def formulas() -> list[Shape]:
 
 
 def grown() -> list[Shape]:
-    """Areas that have grown together, by ridges and distances of many sizes; the last along x and three at once."""
+    """Shapes whose contact areas have merged, with ridges and distances of many sizes; in the last ones along x, and of
+    three areas."""
     wells = (
         (2, 3, 100, 0),
         (5, 2, 50, 0),
@@ -140,7 +143,8 @@ def grown() -> list[Shape]:
 
 
 def profiles() -> list[Shape]:
-    """The main patch of the right wheel S1002 on UIC 60, inclined 1:40, at some lateral shifts (m) and loads (N)."""
+    """Main contact patch of the right wheel (S1002 on UIC 60, inclined 1:40) at several lateral shifts (m) and loads
+    (N)."""
     shapes = []
     for shift, load in ((0.002, 5e4), (0.004, 5e4), (0.006, 2e4), (0.008, 2e4)):
         distance = wheel_on_rail(s1002(), uic60(), lateral_shift=shift)[0].patch.distance
@@ -150,7 +154,8 @@ def profiles() -> list[Shape]:
 
 @dataclass(frozen=True)
 class PlacedWheelset:
-    """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), where that wheel touches."""
+    """A wheelset on a track: lateral shift (m), yaw (rad), load on the right wheel (N), and the contact points of this
+    wheel."""
 
     shift: float
     yaw: float
@@ -159,7 +164,7 @@ class PlacedWheelset:
 
 
 def placed() -> list[PlacedWheelset]:
-    """S1002 on UIC 60 with and without yaw, where the wheel's normals are all but the track's vertical.
+    """Placements of S1002 on UIC 60, with and without yaw, at which the contact normals are nearly vertical.
 
     Half-spaces are joined along the contour there; flange and tread lie on none.
     """
@@ -181,7 +186,7 @@ MARGINS = (1.4, 2.0, 3.0)
 
 
 def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells: int) -> NormalSolution:
-    """The exact contact of profiles: each height counts along the track's vertical."""
+    """Exact normal contact of a wheel on a rail; the heights of all patches count along the track's vertical."""
     boxes = np.array(
         [
             np.add(part.box, (0.0, 0.0, part.patch.contour_position, part.patch.contour_position))
@@ -206,7 +211,7 @@ UNKNOWN_HEIGHT = 1e-3
 
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
-    """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
+    """Heights (ny, nx) of a patch along the track's vertical, on a grid that all patches share."""
     known, across = patch.distance, y - patch.contour_position
     over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), UNKNOWN_HEIGHT)
@@ -216,7 +221,7 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
 
 
 def exact_normal(shape: Shape, cells: int, box: Box) -> NormalSolution:
-    """The exact contact on cells x cells over a box x0, x1, y0, y1 (m)."""
+    """Exact normal contact on a grid of cells x cells over the box x0, x1, y0, y1 (m)."""
     x0, x1, y0, y1 = box
     x, y = (low + (np.arange(cells) + 0.5) / cells * (high - low) for low, high in ((x0, x1), (y0, y1)))
     heights = shape.distance.at(x[None, :], y[:, None])
@@ -236,7 +241,7 @@ def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, 
 
 
 def exact_rolling(normal: NormalSolution, creepage: tuple[float, float, float]) -> RollingSolution | None:
-    """The exact forces, None where the exact solver says that it did not reach them."""
+    """Exact rolling solution; None if the exact solver did not converge."""
     try:
         return solve_rolling(normal, FRICTION, *creepage, PAIR)
     except RunFailed:

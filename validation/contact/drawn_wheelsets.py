@@ -42,7 +42,7 @@ HALF_BRACKET, LOWER_SPEEDS = 0.02, 5
 
 
 def drawn_wheelsets() -> dict[str, Wheelset]:
-    """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
+    """Wheelsets with random parameters, distributed evenly in the logarithm over RANGES."""
     draw, wheelsets = np.random.default_rng(SEED), dict[str, Wheelset]()
     while len(wheelsets) < DRAWN:
         values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
@@ -52,7 +52,8 @@ def drawn_wheelsets() -> dict[str, Wheelset]:
 
 
 def criticals(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None]:
-    """Critical speed (m/s) of each implementation; None where there is none. near : engines look about the first."""
+    """Critical speed (m/s) in each implementation; None where there is none. With ``search_nearby`` the engines search
+    near the reference's critical speed."""
     speeds: dict[str, float | None] = {}
     for engine in IMPLEMENTATIONS:
         of, first = partial(growth, implementation(engine)), speeds.get("reference")
@@ -65,8 +66,8 @@ def criticals(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None
 
 
 def _critical_speed_near(growth: Callable[[float], float], speed: float) -> float:
-    """The critical speed (m/s) within HALF_BRACKET of another; an end of that, or a lower speed, where it is not in
-    it."""
+    """Critical speed (m/s) within HALF_BRACKET of ``speed``. If it is not in this interval, a lower speed with growth
+    or the upper end."""
     low, high = (1.0 - HALF_BRACKET) * speed, (1.0 + HALF_BRACKET) * speed
     for below in np.geomspace(LOWEST_SPEED, low, LOWER_SPEEDS):
         if growth(float(below)) >= 0.0:

@@ -24,7 +24,7 @@ WHY = "median of interleaved rounds, seconds of the processor"
 
 
 def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
-    """Rows for a call and for a cell, and a table (what, time, by the bound)."""
+    """Rows on the time of a call and of a cell, and a table (what, time, ratio to the bound)."""
     draw = np.random.default_rng(5)
     blocks = _blocks(1)
     for name in ("u", "v0", "v1"):
@@ -75,7 +75,7 @@ def _call(ellipse: Ellipse, values: tuple[float, ...]) -> None:
 
 
 def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
-    """Seconds of the processor per unit of every job, in interleaved rounds."""
+    """Processor time (s) per unit of every job; the jobs take turns over several rounds."""
     for job, _ in jobs.values():
         job()
     seconds = np.empty((ROUNDS, len(jobs)))
@@ -89,7 +89,8 @@ def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.nda
 
 @compiled
 def _bound(values, repeats):
-    """A root and a division per element, each independent of all others, in vector registers."""
+    """Lower bound for FASTSIM's arithmetic: one square root and one division per element, all independent, in vector
+    registers."""
     total = 0.0
     for _ in range(repeats):
         for i in range(values.size):
@@ -99,7 +100,7 @@ def _bound(values, repeats):
 
 
 def _blocks(count: int) -> np.ndarray:
-    """Blocks of zeros that begin with a vector register: inside one, the march costs half as much again."""
+    """Array of zero blocks that is aligned to a vector register; without this the march takes half as long again."""
     room = np.zeros(count * BLOCK.itemsize // 8 + 8)
     first = -room.ctypes.data % 64 // 8
     return room[first : first + room.size - 8].view(BLOCK)

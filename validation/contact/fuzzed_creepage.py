@@ -40,7 +40,8 @@ ROUNDING = 1e-12
 
 
 def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
-    """``count`` contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to 1 by b.
+    """``count`` random contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to
+    1/b.
 
     In turn: pure xi_x, xi_y and spin, none at all, spin against lateral creepage with its pole inside the ellipse, all
     of one size, all of random sizes, and a load of zero or less.
@@ -65,8 +66,8 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
 def worst_violation(
     columns: Mapping[str, Any], options: Mapping[str, Any], material_pair: MaterialPair
 ) -> dict[str, float]:
-    """Largest violation of each invariant, divided by mu N and the creepages where it has a size; not finite counts as
-    inf."""
+    """Largest violation of each invariant, divided by mu N (and by the creepages where these scale it); infinite for
+    values that are not finite."""
     creep = fastsim(RollingEllipse(**columns), material_pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
     least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
@@ -101,15 +102,15 @@ def worst_violation(
 
 
 def _largest_finite(values: Array) -> float:
-    """The largest value, infinite if one is none; 0 if there are none, or all are below."""
+    """The largest value; infinite if a value is not finite; 0 if there are no values or all are negative."""
     if not values.size:
         return 0.0
     return float(max(0.0, np.where(np.isnan(values), np.inf, values).max()))
 
 
 def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
-    """Upper bound (n,) of the spin moment (N m) of contacts with semi-axes a, b (m), load (N) and friction mu, (n,)
-    each."""
+    """Upper bound (n,) of the spin moment (N m) for contacts with arrays (n,) of semi-axes a, b (m), load (N) and
+    friction mu."""
     pure = {
         "xi_x": np.zeros_like(columns["a"]),
         "xi_y": np.zeros_like(columns["a"]),
@@ -119,7 +120,8 @@ def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "int
 
 
 def most_power(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
-    """Largest power by the rolling speed (N), (n,), that friction takes from the motion; also xi_x, xi_y, spin."""
+    """Upper bound (n,) of the power that friction dissipates, divided by the rolling speed (N). The columns hold a, b,
+    load, mu, and creepages xi_x, xi_y, spin."""
     a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     work = np.zeros(len(columns["a"]))
     for rows, net in nets(columns["a"] / columns["b"], cells, bound):

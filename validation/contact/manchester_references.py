@@ -43,7 +43,7 @@ SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3
 
 @cache
 def contact_of(case: str) -> WheelsetContact:
-    """Wheelset and track of a case."""
+    """Contact of wheelset and track in a case of the benchmark."""
     return SCENE.contact(SCENE.cases[case])
 
 
@@ -53,7 +53,8 @@ def placed_at(case: str, shift: float) -> WheelsetPlacement:
 
 
 def sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
-    """Mean place across the track (mm), normal force (N), largest pressure (MPa) of all patches of one wheel."""
+    """Sums over the contact patches of one wheel: load-weighted lateral position (mm), normal force (N), and largest
+    pressure (MPa)."""
     places = getattr(placed, wheel)
     normal = sum(place.normal for place in places)
     mean = sum(place.normal * place.y for place in places) / normal
@@ -61,7 +62,8 @@ def sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
 
 
 def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[float, float, list[float]]:
-    """The right wheel lowered on CONTACT's plane: mean place (mm), largest pressure (MPa), both patches' forces (N)."""
+    """The right wheel with its gap measured along CONTACT's plane: mean position (mm), largest pressure (MPa), forces
+    of both patches (N)."""
     side, (_, y, angle) = contact.side, PLANE
     normal, pose = sum(touch.normal for touch in placed.right), _lowered(side, placed)
     place = np.array([-7e-3, y, float(side.rail.curve(y))])
@@ -79,7 +81,7 @@ def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[f
 
 
 def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[float]:
-    """Normal forces (N) of the right wheel's patches, each on a half-space of its own.
+    """Normal forces (N) of the right wheel's patches, each computed with a half-space of its own.
 
     Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
     """
@@ -117,7 +119,7 @@ def _lowered(side: WheelAndRail, placed: WheelsetPlacement) -> Pose:
 
 
 def first_touch(side: WheelAndRail, placed: WheelsetPlacement, sign: float, guess: float) -> tuple[float, float, float]:
-    """First touch of a wheel near a place on it (m from the taping line), by search over points of its surface.
+    """First contact point of a wheel near a guess (m from the taping line), by a search over points of its surface.
 
     sign : 1 for the right wheel, -1 for the left one in its mirror. Both profiles are straight between their points.
     Returns the place across the track and that on the wheel (m), and the rail's angle there (rad).

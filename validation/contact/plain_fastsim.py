@@ -30,14 +30,14 @@ Left = Callable[[float], float]
 
 
 def constant(slip: float) -> float:
-    """Coulomb's friction: all of it is left at any slip."""
+    """Coulomb friction: the friction coefficient does not fall with the slip."""
     return 1.0
 
 
 @dataclass(frozen=True)
 class PlainEllipse:
-    """One ellipse that rolls: a, b (m), load (N), mu, xi_x, xi_y, spin (1/m), flexibilities along x, y and in spin
-    (m^3/N)."""
+    """One rolling elliptic contact: a, b (m), load (N), mu, xi_x, xi_y, spin (1/m), flexibilities along x, y and in
+    spin (m^3/N)."""
 
     a: float
     b: float
@@ -56,8 +56,8 @@ class PlainEllipse:
 
 @dataclass(frozen=True)
 class Program:
-    """How FASTSIM is run: cells per strip, bound, flexibilities "one", "three" or "blended", half a first step and
-    turning ("second-order") or neither ("plain")."""
+    """Settings of FASTSIM: cells per strip; traction bound; flexibilities "one", "three" or "blended"; march
+    "second-order" (half a first step, and turning slip direction) or "plain" (neither)."""
 
     cells: int
     bound: Bound = "intermediate"
@@ -66,7 +66,7 @@ class Program:
 
 
 def hertz(small: float, large: float, elastic: float, load: float) -> tuple[float, float, float]:
-    """Long and short semi-axis and approach (m) by curvatures (1/m), E* (Pa) and load (N); Johnson, section 4.2."""
+    """Long and short semi-axis and approach (m) from curvatures (1/m), E* (Pa) and load (N); Johnson, section 4.2."""
 
     def ratio_of(log_short: float) -> float:
         g2 = math.exp(2.0 * log_short)
@@ -93,7 +93,7 @@ def coefficients(ratio: float, nu: float) -> Array:
 
 
 def _by_nu(values: Array, power: float, nu: float) -> float:
-    """Parabola of a power of the values at nu = 0, 1/4, 1/2."""
+    """Parabola in nu through the values at nu = 0, 1/4, 1/2, which are raised to a power before."""
     return float(barycentric_interpolate([0.0, 0.25, 0.5], values**power, nu)) ** (1.0 / power)
 
 
@@ -105,7 +105,8 @@ def narrow_coefficients(g: float, nu: float) -> Array:
 
 
 def long_coefficients(ratio: float, nu: float) -> Array:
-    """Last row of the same table, b/a = g to 0; C33 linear in logarithms through its nodes, and on beyond."""
+    """Last row of the same table, b/a = g to 0. C33 is interpolated linearly in logarithms between its nodes, and
+    extrapolated beyond them."""
     g, log_16 = 1.0 / ratio, math.log(16.0 * ratio**2)
     rest = 3.0 - math.log(4.0)
     c11 = 2.0 * math.pi / ((log_16 - 2.0 * nu) * g) * (1.0 + rest / (log_16 - 2.0 * nu))
@@ -116,7 +117,7 @@ def long_coefficients(ratio: float, nu: float) -> Array:
 
 
 def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, float, float]:
-    """L1, L2, L3 (m^3/N) of Kalker (1982), L3 with the least that passive tractions ask for."""
+    """Flexibilities L1, L2, L3 (m^3/N) by Kalker (1982); L3 is not less than passive tractions require."""
     c11, c22, c23, _ = coefficients(a / b, nu)
     along, across = 8.0 * a / (3.0 * shear * c11), 8.0 * a / (3.0 * shear * c22)
     least = across / (1.0 + STIFFER_SPIN * (b / a) ** 2)
@@ -136,7 +137,7 @@ def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
 
 
 def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
-    """Weight of the common flexibility, by the reach (3,) of the three creepages."""
+    """Weight of the common flexibility relative to the three separate ones, from the scaled creepages (3,)."""
     x, y, z = reach
     shape = min(max(ellipse.a / ellipse.b, 0.1), 10.0)
     turns = OF_SPIN * shape**SPIN_BY_RATIO * z
@@ -147,8 +148,8 @@ def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
 
 
 def fastsim(ellipse: PlainEllipse, program: Program, left: Left = constant) -> tuple[Array, Array]:
-    """fx, fy (N), mz (N m), share of the area that sticks (4,), and the tractions of all cells (strips, cells), complex
-    (Pa)."""
+    """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,); complex tractions (Pa) of all cells
+    (strips, cells)."""
     a, b, n, power = ellipse.a, ellipse.b, program.cells, POWERS[program.bound]
     strips = 2 * math.ceil(n * min(max((b / (2.0 * a)) ** 0.6, 1.0), MOST_STRIPS) / 2.0 - 1e-9)
     y = b * (strips - 1.0 - 2.0 * np.arange(strips)) / strips
@@ -167,7 +168,8 @@ def fastsim(ellipse: PlainEllipse, program: Program, left: Left = constant) -> t
 def _strip(
     ellipse: PlainEllipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
 ) -> tuple[list[complex], list[bool]]:
-    """Tractions of one strip at y with a half length (m) from the leading edge back, and whether each cell slips."""
+    """Tractions of one strip at y, with a half length (m), from the leading to the trailing edge, and whether each cell
+    slips."""
     (y, half), n, power = place, program.cells, POWERS[program.bound]
     dx, turns = 2.0 * half / n, program.march == "second-order"
 
@@ -196,8 +198,8 @@ def _strip(
 
 
 def _direction_after_step(p: complex, rigid: complex, turning: float, dx: float, bound: float) -> complex:
-    """Direction of a slipping traction after a step dx; rigid : slip by flexibility in the step's middle, ``turning``
-    its lateral part's change per m of x, bound : Pa there.
+    """Direction of the traction in a slipping cell after a step dx. rigid : rigid slip divided by the flexibility at
+    mid-step; turning : change of its lateral component per m of x; bound : traction bound (Pa).
 
     tan(psi/2), psi between traction and -rigid, shrinks by exp(|rigid| dx / bound), the exponential an eighth power of
     its series and the slip taken a little after the middle, both as ``fastsim_kernels`` says.

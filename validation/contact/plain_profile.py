@@ -23,7 +23,8 @@ def rail_of(profile: LaidProfile) -> PPoly:
 
 
 def circles(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
-    """Of each circle depth (n,), and place of the nearest point from the centre and the rail's normal there (n, 3)."""
+    """For each circle of the wheel: penetration (n,), and its nearest point relative to the wheelset's centre and the
+    rail's normal there, both (n, 3)."""
     head, nodes, rail = profile.head[0], profile.nodes, rail_of(profile)
     turn = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()
     # A point (r sin phi, side (arm + y), r cos phi) has the normal (sin phi, -side slope, cos phi) in the wheelset.
@@ -39,7 +40,7 @@ def circles(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, 
 
 
 def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
-    """TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
+    """Contacts TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
     depth, points, normals = circles(side, pose, profile)
     zone, length = profile.nodes["zone"], np.arange(depth.size) * profile.head[0].spacing
     radial = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()[:, 2]
@@ -62,7 +63,8 @@ def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> A
 
 
 def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
-    """Normal force (N) and semi-axes along and across (m) by Hertz at a penetration (m); zeros for a gap."""
+    """Normal force (N) and semi-axes along and across (m) by Hertz for a penetration (m); zeros where there is a
+    gap."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
     long, short, approach = hertz(min(along, across), max(along, across), modulus, 1.0)
@@ -72,7 +74,7 @@ def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[
 
 
 def settled(touches: Array, modulus: float) -> Array:
-    """Depths (n,) of patches that press the surface down under each other."""
+    """Penetrations (n,) of contact patches, reduced by the surface deformation that the other patches cause."""
     alone = touches["depth"].copy()
     loads, axes = np.array([pressed(t.depth, t.along, t.across, modulus)[:2] for t in touches]).T
     places = np.column_stack([touches[name] for name in ("x", "y", "z")])

@@ -25,7 +25,8 @@ Box = tuple[float, float, float, float]
 
 
 def hermite(nodes: Array, padded: Array) -> CubicHermiteSpline:
-    """Spline along the first axis through values on even nodes, given with one more at both ends."""
+    """Cubic spline along the first axis through values at equally spaced nodes; the values include one extra node at
+    each end."""
     return CubicHermiteSpline(nodes, padded[1:-1], (padded[2:] - padded[:-2]) / (nodes[2] - nodes[0]))
 
 
@@ -36,7 +37,8 @@ def continued(rows: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PlainBodies:
-    """Undeformed distance: nodes x (nx,) and y (ny,), heights (ny, nx) and its lowest point (m)."""
+    """Undeformed distance of two bodies: nodes x (nx,) and y (ny,), heights (ny, nx) in m, and position of the lowest
+    point (m)."""
 
     x: Array
     y: Array
@@ -45,15 +47,15 @@ class PlainBodies:
 
     @cached_property
     def padded(self) -> Array:
-        """Heights with one more node on every side."""
+        """Heights with one extrapolated node added on every side."""
         return continued(continued(self.height).T).T
 
     def line(self, y: float, order: int = 0) -> CubicHermiteSpline:
-        """Distance, or its derivative to y of an order, as a function of x."""
+        """Distance at a position y as a function of x, or its y derivative of the given order."""
         return hermite(self.x, hermite(self.y, self.padded)(y, order))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """Distance and its slopes to x and y on the net of x (nx,) and y (ny,)."""
+        """Distance and its slopes in x and y on the grid of x (nx,) and y (ny,)."""
         lines, steep = [self.line(each) for each in y], [self.line(each, 1) for each in y]
         return np.array([f(x) for f in lines]), np.array([f(x, 1) for f in lines]), np.array([f(x) for f in steep])
 
@@ -64,8 +66,8 @@ class PlainBodies:
 
     @cached_property
     def valleys(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Along x and along y: lines, two for each spacing and one through the bottom, and the root of the least
-        distance on each over the bottom."""
+        """For lines across x and across y: their positions (two per node spacing, and one through the lowest point),
+        and the square root of each line's least distance above the lowest point."""
         swapped = PlainBodies(self.y, self.x, self.height.T, self.bottom[::-1])
         return swapped._valley(), self._valley()
 
@@ -77,7 +79,8 @@ class PlainBodies:
         return np.append(lines, self.bottom[1])[order], roots[order]
 
     def box(self, depth: float) -> Box:
-        """Rectangle x0, x1, y0, y1 (m) about the area below a depth (m) of a valley that rises to all sides."""
+        """Rectangle x0, x1, y0, y1 (m) around the area below a depth (m); the distance must rise to all sides from its
+        lowest point."""
         root, ends = math.sqrt(depth - self.low), list[float]()
         for (lines, roots), bottom in zip(self.valleys, self.bottom, strict=True):
             before, after = lines <= bottom, lines >= bottom
@@ -93,18 +96,19 @@ def _lowest_value(spline: CubicHermiteSpline) -> float:
 
 
 def middles(low: float, high: float, count: int) -> Array:
-    """Middles of equal parts."""
+    """Midpoints of equal intervals."""
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
 def overlap(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
-    """W times the pressure (m) at heights (m)."""
+    """Pressure times W (m) at heights (m), for a contact of the given depth."""
     over = np.maximum(depth - height, 0.0)
     return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
 
 
 def spread(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
-    """Displacement (m) on a square net by one component of traction (Pa) on it; parts : the influence's component."""
+    """Displacement (m) on a square grid due to one component of traction (Pa) on it; parts : indices of displacement
+    and traction component."""
     n = len(values)
     kernel = influence(offsets(n, step[0]), offsets(n, step[1])[:, None], *step, material_pair)[(..., *parts)]
     return convolve2d(kernel, values, mode="valid")
@@ -112,7 +116,8 @@ def spread(values: Array, step: tuple[float, float], material_pair: MaterialPair
 
 @dataclass(frozen=True)
 class PlainPatch:
-    """One patch at a depth: W times the load (m^3), stiffness 1/W (Pa/m), approach and box (m), covered shares."""
+    """One contact patch at a depth: integral of W times pressure (m^3), stiffness 1/W (Pa/m), approach and box (m), and
+    covered share of each cell."""
 
     depth: float
     volume: float
@@ -128,7 +133,7 @@ class PlainPatch:
 
 
 def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, options: SimplifiedOptions) -> PlainPatch:
-    """The fit on the crude net."""
+    """The patch at a depth, with its stiffness fitted on the coarse grid."""
     box, n = bodies.box(depth), options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     height, slope_x, slope_y = bodies.at(middles(*box[:2], n), middles(*box[2:], n))
@@ -148,8 +153,8 @@ def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, opt
 def fitted_slopes(
     u: Array, p: Array, cover: Array, step: tuple[float, float], options: SimplifiedOptions, by_height: bool = False
 ) -> float:
-    """Slope of u (k, n, n) against p by weighted least squares of all k, or of their slopes; ``by_height``: that of p
-    against u, by differences along y too."""
+    """Slope of u (k, n, n) over p by weighted least squares, common to all k components; or the same with differences
+    of u and p between neighbouring cells. ``by_height``: p is fitted over u, with differences along y, too."""
     if options.fit == "displacement":
         parts = np.array(
             [np.cov(a.ravel(), b.ravel(), aweights=cover.ravel(), ddof=0) for a, b in zip(u, p, strict=True)]
@@ -178,7 +183,8 @@ def press(bodies: PlainBodies, approach: float, material_pair: MaterialPair, opt
 
 @dataclass(frozen=True, eq=False)
 class Strips:
-    """Strips: y, low and high end in x (s,) and their width (m), pressure (s, n) from the leading edge back (Pa)."""
+    """Strips of a contact: positions y, ends in x (s,) and width (m), and pressure (s, n) in Pa from the leading edge
+    back."""
 
     y: Array
     low: Array
@@ -188,8 +194,8 @@ class Strips:
 
 
 def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: SimplifiedOptions) -> Strips:
-    """Strips between the places where the distance passes the depth; one too short to hold a node or the middle
-    between two nodes is none, as the package looks there for contact."""
+    """Strips between the two points at which the distance equals the depth. Strips too short to contain a node, or a
+    midpoint between nodes, are left out, as the package looks for contact at these."""
     box, ends = patch.box, []
     for y in middles(*box[2:], cells):
         line = bodies.line(float(y))
@@ -206,7 +212,7 @@ def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: Simplifi
 
 
 def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Tractions (s, n), complex (Pa), and which cells slip."""
+    """Complex tractions (s, n) in Pa, and whether each cell slips."""
     xi_x, xi_y, spin = motion
     tractions, slips = np.zeros(net.pressure.shape, complex), np.zeros(net.pressure.shape, bool)
     for s, (y, low, high) in enumerate(zip(net.y, net.low, net.high, strict=True)):
@@ -229,7 +235,7 @@ def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float
 
 
 def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
-    """Mean tractions (2, n, n) of the meshes of the crude net, by the areas that cells and meshes have in common."""
+    """Mean tractions (2, n, n) in the cells of the coarse grid, weighted by the common area of both kinds of cells."""
     across = _common(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
     cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
     along = np.array([_common(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
@@ -240,7 +246,7 @@ def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
 def refitted(
     patch: PlainPatch, net: Strips, tractions: Array, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> float:
-    """W_1 = W_2 (m/Pa) of the tractions of a march."""
+    """Flexibility W_1 = W_2 (m/Pa), fitted to the tractions of a march."""
     n, box = options.net, patch.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
     p = gathered(net, tractions, box, n)
@@ -249,7 +255,7 @@ def refitted(
 
 
 def _common(low: Array, high: Array, edges: Array) -> Array:
-    """Lengths that intervals (m,) have in common with the parts between edges (n + 1,): (m, n)."""
+    """Common lengths (m, n) of intervals (m,) and of the n segments between edges (n + 1,)."""
     return np.maximum(np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1]), 0.0)
 
 
@@ -262,7 +268,7 @@ def roll(
     cells: int,
     options: SimplifiedOptions,
 ) -> tuple[Array, float]:
-    """fx, fy (N), mz (N m) and the share of the area that sticks (4,), and W_1 (m/Pa)."""
+    """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,), and flexibility W_1 (m/Pa)."""
     net = strips(bodies, patch, cells, options)
     first, _ = march(net, mu, 1.0 / patch.stiffness, motion)
     flexibility = refitted(patch, net, first, material_pair, options)

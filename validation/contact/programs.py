@@ -19,8 +19,8 @@ ROUNDS = 5
 
 
 def compare(cases: list[ContactCase]) -> dict[str, Any]:
-    """Errors of both programs divided by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one
-    evaluation."""
+    """Errors of the programs of 1982 and 1983 divided by mu N, errors of the 1983 normal contact relative to Hertz, and
+    computing time (s) of an evaluation."""
     pressed = {(c.a, c.b): _normal_contact(c) for c in cases}
 
     def old(case: ContactCase) -> Creep:
@@ -58,7 +58,7 @@ def _normal(case: ContactCase, pressed: NormalContact) -> dict[str, float]:
 
 
 def table(comparison: dict[str, Any]) -> Table:
-    """The paper's comparison with figures in it."""
+    """Table of the paper's comparison of both programs, with our figures."""
     error = {
         name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
         for name, e in comparison["errors"].items()

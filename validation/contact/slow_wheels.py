@@ -25,7 +25,8 @@ STEPS = {1.0: (1e-3, 2e-3, 4e-3), 0.1: (1e-3, 4e-3), 0.05: (1e-3, 4e-3), 0.0: (1
 
 @dataclass(frozen=True)
 class SlowWheelsRun:
-    """One run: its method, step (s), steps, force calls, and its error by what is left of the displacements."""
+    """One run with slow wheels: speed, method, step (s), numbers of steps and force calls, and its error divided by the
+    largest remaining displacement."""
 
     speed: float
     method: str
@@ -36,12 +37,12 @@ class SlowWheelsRun:
 
 
 def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
-    """One wheel with FASTSIM, pulled aside and let go."""
+    """A wheel with FASTSIM at a speed, and the displaced state from which it is released."""
     return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
 def counting(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
-    """The function, every call of which adds ``increment`` to ``calls``."""
+    """The function, wrapped so that every call adds ``increment`` to ``calls``."""
 
     def counted(*arguments: Any) -> Any:
         calls[0] += increment
@@ -51,7 +52,7 @@ def counting(function: Callable[..., Any], calls: list[int], increment: int = 1)
 
 
 def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tuple[Array, int]:
-    """Positions at the end and the number of force calls; RunFailed or Refused where there are none."""
+    """Final positions and number of force calls; raises RunFailed or Refused if the method cannot take the steps."""
     (wheels, start), calls = wheel(speed), [0]
     forces = Forces(wheels)
     slopes = forces.slopes if with_slopes and method in METHODS else None
@@ -60,12 +61,13 @@ def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tu
 
 
 def longest_step(speed: float) -> float:
-    """Longest step (s) of RK44."""
+    """Longest stable step (s) of RK44."""
     return limit("RK44", 1e-3, LONG_RUN * 1e-3, linear(wheel(speed)[0]))
 
 
 def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
-    """The explicit run at nearly its longest step, against one of half of it, and implicit ones of some steps (s)."""
+    """One explicit run at nearly its longest stable step, and implicit runs with several steps (s). Their errors are
+    relative to an explicit run with half the step."""
     coarse = int(np.ceil(1.05 * DURATION / longest_step(speed)))
     true, _ = march(speed, "RK44", 2 * coarse)
     done = []
@@ -77,7 +79,8 @@ def runs(speed: float, steps: tuple[float, ...]) -> list[SlowWheelsRun]:
 
 
 def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
-    """Implicit steps at 1 m/s beside explicit ones, and what is said where none can be taken."""
+    """Rows and runs: implicit methods at 1 m/s compared with explicit ones, and the messages where a step cannot be
+    taken."""
     done = runs(1.0, (STEP_RATIO * longest_step(1.0), *(() if quick else STEPS[1.0])))
     if not quick:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
@@ -116,7 +119,7 @@ def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
 
 
 def table(saved: list[dict[str, Any]]) -> Table:
-    """Every run."""
+    """Table of all runs."""
     lines = tuple(
         (
             f"{run['speed']:g}",

@@ -36,7 +36,7 @@ def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
 
 
 def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
-    """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
+    """Rotations (paths, 4) between true and noisy attitude at the end, for noisy paths of one true motion."""
     true = true_attitude(rates, period, START)[-1]
     chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
     ends = [measured_attitude(rates, period, deviation, START, chunk, SEED)[-1] for chunk in chunks]
@@ -44,7 +44,8 @@ def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) 
 
 
 def standard_errors(attitudes: np.ndarray, law: np.ndarray) -> float:
-    """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
+    """Largest difference between the mean rotation matrix of quaternions (n, 4) and its law, in standard errors of the
+    entry."""
     samples = matrix(attitudes)
     error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
     return float((np.abs(samples.mean(axis=0) - law) / error).max())

@@ -40,27 +40,28 @@ BAND = 15.0
 
 
 def at_period(deviation: float, period: float) -> float:
-    """Standard deviation per sample at a sampling period, with the noise intensity that ``deviation`` has at 1 kHz."""
+    """Standard deviation per sample at a sampling period, such that the noise intensity is that of ``deviation`` at 1
+    kHz."""
     return deviation * float(np.sqrt(1e-3 / period))
 
 
 @cache
 def measured(folder: Path, duration: float, period: float) -> Result:
-    """The virtual measurement on the study road, its files left in the folder; rows ``period`` (s) apart."""
+    """Virtual measurement on the study road with rows ``period`` (s) apart; its files are written to the folder."""
     path = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
     write_measurement(path, folder, period)
     return path.every(period)
 
 
 def force_deviation(true: Result) -> float:
-    """0.2 % of the largest wheel force (N)."""
+    """Standard deviation of the force noise: 0.2 % of the largest wheel force (N)."""
     return FRACTION * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
 
 
 def driven_vehicle(
     folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
 ) -> Scene:
-    """The vehicle under the forces in the folder, steps of 1 ms."""
+    """Scene of the vehicle driven by the forces in the folder, with steps of 1 ms."""
     override = perturbed(PARAMETERS) if wrong else {}
     return changed(
         force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
@@ -68,18 +69,18 @@ def driven_vehicle(
 
 
 def noise_of(deviation: float, seed: int) -> dict[str, Any]:
-    """The effect of noisy forces."""
+    """Settings of the effect that adds noise to the forces."""
     return {"force_noise": {"deviation": deviation, "seed": seed}}
 
 
 def free_run(assembly: Assembly, duration: float, period: float) -> np.ndarray:
-    """States (n, 8) of the reference, ``period`` apart."""
+    """States (n, 8) of a run without stabiliser in the reference, ``period`` (s) apart."""
     states = build("reference", assembly, Settings("RK4", 1e-3, duration)).run().states
     return states[:: round(period / 1e-3)]
 
 
 def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tuple[float, float]]) -> dict[str, Any]:
-    """One run without model error: NEES, NIS and innovations of filters whose Q and R are scaled, by name.
+    """NEES, NIS and innovations of filters in a run without model error, by name; ``scales`` multiplies their Q and R.
 
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
@@ -107,14 +108,15 @@ START = 0.02
 
 
 def nees(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
-    """Normalised error squared of the six states, once a second from the second one on."""
+    """Normalised estimation error squared of the six states, once a second from the second one on."""
     rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
     wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]
     return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.errors()[rows, :6, :6], wrong))[:, 0, 0]
 
 
 def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition (14, 14) and stationary covariance of [estimate's error, run's error, force noise], linearised.
+    """Linearised loop of filter and vehicle: transition (14, 14) and stationary covariance of the filter's error, the
+    run's error and the force noise.
 
     Errors are those of the six relative states at the samples, estimate after its update, ``COARSE_PERIOD`` apart.
     Exact: exponentials of the vehicle's and of the held vehicle's matrices under inputs that are linear between
@@ -147,7 +149,8 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """A (6, 6) and B (6, 2) of the relative states under the wheel forces, about zero pitch."""
+    """Matrices A (6, 6) and B (6, 2) of the states relative to the chassis under wheel forces, linearised about zero
+    pitch."""
     p = assembly.parameters
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
@@ -155,8 +158,8 @@ def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """First-order hold over COARSE_PERIOD: transition, and what the input's samples at the start and at the end of the
-    step add."""
+    """Discretisation over COARSE_PERIOD with linearly interpolated input: transition matrix, and input matrices of the
+    samples at start and end."""
     n, m = b.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b
@@ -167,7 +170,8 @@ def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> np.ndarray:
-    """Errors (n, 12) of estimate and run as ``closed_loop`` orders them, after 2 s: the effect itself, linearised.
+    """Errors (n, 12) of the estimate and of the run, ordered as in ``closed_loop``, from 2 s on, by the effect itself
+    on the linearised vehicle.
 
     deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
     samples would add an error that is no noise.
@@ -204,7 +208,8 @@ def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) 
 def stabilised(
     folder: Path, duration: float, seed: int, engines: tuple[str, ...], wrong: bool = True
 ) -> dict[str, dict[str, float]]:
-    """Damage ratios, shares of the artificial moment and pitch error of the stabilised runs of one noise sample."""
+    """Scores of the runs of each engine that the Kalman filter stabilises, for one noise sample: damage ratios, shares
+    of the artificial moment, and pitch error."""
     true = measured(folder, duration, 1e-3)
     seen = true["pitch"] + ANGLE * normal(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
@@ -233,8 +238,8 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
 
 
 def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
-    """Standard deviation of the pitch (rad) by a gyro alone after a long run, and the value by the averaged
-    instability.
+    """Standard deviation of the pitch (rad) after a long run on a gyro alone, and the value that its averaged
+    instability predicts.
 
     The law: the stationary Riccati equation of pitch'' = lambda^2 pitch + noise with the rate measured. About a
     vehicle that stands level, A(0), the same gyro leaves a random walk.
@@ -270,7 +275,8 @@ def with_gaps(
     random_gaps: float,
     outage: tuple[float, float] | None,
 ) -> dict[str, float]:
-    """A stabilised run on a file with holes: its worst error by the deviation that the filter states, and counts."""
+    """Figures of a stabilised run on a file with missing samples: largest ratio of the pitch error to the deviation
+    that the filter states, and counts of missing samples."""
     true = measured(folder, duration, COARSE_PERIOD)
     deviations = {PITCH: at_period(ANGLE, COARSE_PERIOD), RATE: at_period(GYRO, COARSE_PERIOD)}
     clean = free_run(assemble(driven_vehicle(folder, duration, {})), duration, COARSE_PERIOD)

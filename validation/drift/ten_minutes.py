@@ -12,7 +12,7 @@ TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 
 
 def tables(data: Saved) -> list[Table]:
-    """The ten minutes over time."""
+    """Table of the ten-minute example's angle errors over time."""
     if not data["ten minutes"]:
         return []
     rms, walk = data["ten minutes"]["rms"], math.degrees(random_walk(DEVIATION, RATE))

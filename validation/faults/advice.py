@@ -34,13 +34,14 @@ CALL = 1e-6
 
 
 class _Clock:
-    """Moves on by force calls alone, so that the setting recommended by seconds is the same on any machine."""
+    """Simulated clock that advances with force calls only, so that the setting recommended by time is the same on any
+    machine."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
     def process_time(self) -> float:
-        """Seconds."""
+        """Simulated time (s)."""
         return self.now
 
     perf_counter = process_time
@@ -51,13 +52,15 @@ CLOCK = _Clock()
 
 @dataclass(frozen=True)
 class Swing:
-    """See ``models.advice.price.PricedScene``. The error has grown by the end, beyond what is searched."""
+    """Test problem y' = y cos t for ``models.advice.price.PricedScene``. Its error goes on growing after the part of
+    the run that is searched."""
 
     title, quantity, unit, kink_period, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
 
     def ladders(self) -> list[SettingLadder]:
-        """Methods of one engine; the default is of order 2; one of them breaks down on the way."""
+        """Settings of four methods of one engine: the default has order 2, and one method breaks down at a finer
+        step."""
         return [
             SettingLadder("mujoco", "RK4", STEPS, 4),
             SettingLadder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
@@ -66,14 +69,15 @@ class Swing:
         ]
 
     def reference(self) -> SettingLadder:
-        """RK4, whose first rung is known to no better than some of the settings tried."""
+        """RK4 with halved steps; the accuracy of the coarsest one is no better than that of some settings to be
+        judged."""
         return SettingLadder("reference", "RK4", tuple(0.1 / 2**k for k in range(8)), 4)
 
     def second(self, reference_setting: Setting) -> None:
         """None, as no second method is needed: the checks know the closed form."""
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times, values, calls."""
+        """Times and values of the solution, and number of force calls."""
         n = round(duration / setting.value)
         places, weights = STAGES.get(setting.method, STAGES["Euler"])
         values = [1.0]
@@ -85,7 +89,7 @@ class Swing:
         return times, np.array(swing), len(places) * n
 
     def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> PricedRun:
-        """y."""
+        """The quantity y of a solution."""
         times, values, calls = solution
         return PricedRun(times, values[:, None], {"force calls": calls})
 
@@ -104,7 +108,7 @@ def _step(t: float, y: float, h: float, places: tuple[float, ...], weights: tupl
 
 @cache
 def _error(setting: Setting) -> float:
-    """True error over the whole run, infinite for what is no number."""
+    """True error over the complete run; infinite if a value is not finite."""
     times, values, _ = Swing().solve(setting, Swing.whole)
     worst = float(np.abs(values - np.exp(np.sin(times))).max())
     return worst if math.isfinite(worst) else math.inf
@@ -112,7 +116,7 @@ def _error(setting: Setting) -> float:
 
 @cache
 def _fewest_calls(tolerance: float) -> int:
-    """Fewest calls with which any setting holds the tolerance: all are run."""
+    """Fewest force calls with which any setting keeps the tolerance, found by running all settings."""
     swing = Swing()
     return min(
         swing.solve(setting, swing.whole)[2]
@@ -133,7 +137,8 @@ def _choice_for(tolerance: float) -> Recommendation:
 def _largest_winner(
     size: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
 ) -> float:
-    """Largest size of the winners by a cost, for each tolerance asked for; infinite where there is no winner."""
+    """Largest ``size`` among the recommended settings of one kind of cost, over all tolerances; infinite where none is
+    recommended."""
     return max(
         max(
             (
@@ -187,7 +192,7 @@ def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommend
 
 
 def _tenth(original: Any) -> Any:
-    """Errors of the winners by ten."""
+    """Fault: errors of the recommended settings are reported ten times too small."""
 
     def told(*arguments: Any) -> Any:
         known, timed, winners = original(*arguments)

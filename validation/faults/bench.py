@@ -54,7 +54,8 @@ def bench_scene(parameters: str, duration: float) -> Scene:
 
 @dataclass(eq=False)
 class Bench:
-    """One vehicle, by the name of its parameter set, and runs of ``duration`` (s)."""
+    """A vehicle, named by its parameter set, in several situations of ``duration`` (s), in which faults are looked
+    for."""
 
     parameters: str
     duration: float
@@ -97,8 +98,8 @@ class Bench:
 
     @cached_property
     def stabilised(self) -> Assembly:
-        """The vehicle under sampled wheel forces, with an added moment and a spring whose dead band the pitch
-        leaves."""
+        """The vehicle under sampled wheel forces, with an added moment, and with a pitch spring whose dead band is
+        exceeded."""
         moment = Sampled(3e3 * self._swell(31.0)[:, None], SAMPLING_PERIOD, held=False)
         spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
         vehicle = replace(self.held.vehicle, pitch_springs=(spring,))
@@ -106,7 +107,7 @@ class Bench:
 
     @cached_property
     def truth(self) -> Trajectory:
-        """The road run of the reference at a sixteenth of the order check's step."""
+        """The reference's run on the road at a sixteenth of the order check's step, which serves as truth."""
         return checks.engine("reference")(self.road, Settings("RK4", ORDER_STEP / 16, self.duration)).run()
 
     @cache  # noqa: B019 - a bench lives as long as its case
@@ -121,12 +122,12 @@ class Bench:
         return checks.accelerations(reference, getattr(self, situation), settings, random_states())
 
     def _swell(self, frequency: float) -> np.ndarray:
-        """Samples of a swell from 0 to 1 and back with a smooth start; frequency in rad/s."""
+        """Samples that rise smoothly from 0 to 1 and fall back, periodically with a frequency in rad/s."""
         times = SAMPLING_PERIOD * np.arange(round(self.duration / SAMPLING_PERIOD) + 4)
         return 0.5 * (1 - np.cos(frequency * times))
 
     def _forces(self) -> np.ndarray:
-        """Static wheel forces, swollen by 20 % in front and 15 % behind, shape (n, 2), N."""
+        """Wheel forces (n, 2) in N: the static ones, raised periodically by up to 20 % in front and 15 % behind."""
         p = self.road.parameters
         front, rear = p.m1 + p.m3 * p.a / (p.a + p.b), p.m2 + p.m3 * p.b / (p.a + p.b)
         return p.g * np.column_stack([front * (1 + 0.2 * self._swell(20.0)), rear * (1 + 0.15 * self._swell(27.0))])
@@ -138,7 +139,8 @@ class Bench:
 
 @dataclass(frozen=True)
 class Check:
-    """measure(bench, engine name, make) -> size; what exceeds ``tolerance`` is seen."""
+    """A check that looks for faults. measure(bench, engine name, make) returns an error; if this exceeds ``tolerance``,
+    the check has seen the fault."""
 
     title: str
     unit: str
@@ -164,14 +166,15 @@ def _momentum(bench: Bench, engine: str, make_engine: Make) -> float:
 
 
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
-    """Error of enforced moment and force against the eliminated form."""
+    """A check's function: error of the enforced moment and force, compared with the form in which the pitch is
+    eliminated."""
     return lambda bench, engine, make: enforced_gap(
         make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
     )
 
 
 def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
-    """Largest difference of the path to the reference's."""
+    """A check's function: largest difference of an engine's path from the reference's."""
     return lambda bench, engine, make: state_gap(
         run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
     )
@@ -229,7 +232,7 @@ CHECKS: dict[str, Check] = {
 
 
 def size(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
-    """Size that a check finds; infinite where the engine refuses or fails."""
+    """Error that a check measures; infinite where the engine refuses or fails."""
     try:
         return check.measure(bench, engine, make_engine)
     except (InputError, RunFailed):

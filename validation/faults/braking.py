@@ -29,7 +29,8 @@ SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
 def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
-    """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
+    """The truck after one step with all wheels locked, or steered with rolling wheels. On SPLIT the left side is dry
+    and the right side ice; else all is ice."""
     tables = tyre_table.stacked([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
     truck = RollingTruck(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, step_function=advance)
     if not steer:
@@ -44,7 +45,8 @@ LEVEL = stops.steady_torque(stops.FRONT, DRY, 0.004)[1]
 
 
 def _light() -> float:
-    """Quarter vehicle, light braking on dry road: way against the exact one."""
+    """Light braking of a quarter vehicle on dry road: relative difference of the stopping distance from the exact
+    one."""
     return abs(stops.stop(stops.FRONT, stops.friction_table("dry"), LEVEL, 11.11).distance / _exact_distance() - 1.0)
 
 
@@ -55,7 +57,7 @@ def _exact_distance() -> float:
 
 
 def _transfer() -> float:
-    """Locked on even friction: load of the front wheels against W (b + mu h) / (2 L), relative."""
+    """All wheels locked on even friction: relative difference of the front wheels' load from W (b + mu h) / (2 L)."""
     report = _first_step(UNIFORM_ROAD).report
     slide = float(stops.friction_table("ice")[0].mu_x[0, 0, -1])
     base = 1.42 + 2.19
@@ -64,7 +66,8 @@ def _transfer() -> float:
 
 
 def _split() -> float:
-    """Locked, the left side dry: yaw acceleration against the moment of the reported forces."""
+    """All wheels locked, dry on the left side only: difference of the yaw acceleration from that by the reported
+    forces' moment."""
     truck = _first_step(SPLIT)
     x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
     moment = float(x @ truck.report.force_y - y @ truck.report.force_x)
@@ -72,18 +75,19 @@ def _split() -> float:
 
 
 def _turns_left() -> float:
-    """Steered to the left: 1 if the truck does not yaw to the left, and 1 if it is not the left that is unloaded."""
+    """The truck is steered to the left: 1 if it does not yaw to the left, plus 1 if its left side is not unloaded."""
     truck = _first_step(UNIFORM_ROAD, 0.05)
     return float(not truck.state[1, 2] > 0.0) + float(not truck.report.load[0] < truck.report.load[1])
 
 
 def _pulls_left() -> float:
-    """Dry on the left: 1 if the truck does not yaw to the left."""
+    """The left side is dry: 1 if the truck does not yaw to the left."""
     return float(not _first_step(SPLIT).state[1, 2] > 0.0)
 
 
 def _loop() -> float:
-    """Area of a brake's loop from 0 to 5 bar and back against its closed form, by it."""
+    """Relative error of the area of a brake's hysteresis loop from 0 to 5 bar and back, compared with the closed
+    form."""
     brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
     torques = brake.torques(pressures, brakes)
@@ -99,18 +103,19 @@ def _push_out() -> float:
 
 
 def _nodes() -> float:
-    """Friction of the stacked table at its own nodes against the tyre's."""
+    """Difference between the stacked friction table at its nodes and the tyre's own table."""
     tables = tyre_table.stacked([DRY])
     return float(np.abs(np.interp(DRY.slips, tables.slips, tables.mu_x[0, 0, 0]) - DRY.mu_x[0, 0]).max())
 
 
 def _distance_at_steady_slip() -> float:
-    """Quarter vehicle at a slip that stays: way against m v^2 / (2 F), as in the hard case of that name."""
+    """Quarter vehicle at constant slip: relative difference of the distance from m v^2 / (2 F), as in the hard case of
+    this name."""
     return float(wheels.steady_slip_case(wheels.DRY, 0.02)("reference", Path()))
 
 
 def _code() -> float:
-    """Largest error of a ramp converted to 12 bits against half of a code, by that."""
+    """Largest error of a ramp converted to 12 bits, compared with half a code; in units of this."""
     ramp = np.linspace(0.0, 30.0, 100_001)
     channels = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
     return float(abs(np.abs(channels(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
@@ -133,7 +138,7 @@ CHECKS = {
 
 
 def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    """Numbers of every truck changed."""
+    """Patch that changes the numbers of every truck."""
     return attribute(
         "models.brake.plane_vehicle:truck", lambda real: lambda *arguments: _changed(real(*arguments), change)
     )
@@ -149,7 +154,7 @@ def _brakes(change: Callable[[Any], Any]) -> Patch:
 
 
 def _force_of_step_start(original: Any) -> Any:
-    """The vehicle driven by the force of the start of each step."""
+    """Fault: each step of the vehicle uses the tyre force at the step's start."""
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
         way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
@@ -167,12 +172,13 @@ def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
 
 
 def _mirrored(original: Any) -> Any:
-    """Steer angles, and by them the slip angles of the steered wheels, with the other sign."""
+    """Fault: steer angles, and thus the slip angles of steered wheels, have the opposite sign."""
     return lambda motion, torques, step, steer, vehicle: original(motion, torques, step, -steer, vehicle)
 
 
 def _spin(factor: float) -> Patch:
-    """Spin inertia of the quarter vehicle's wheel in the step, not in the closed form."""
+    """Fault: the spin inertia of the quarter vehicle's wheel is changed in the time step, but not in the closed
+    form."""
 
     def change(original: Any) -> Any:
         return property(lambda truck: _changed(original.fget(truck), {"spin": lambda spin: factor * spin}))
@@ -181,7 +187,7 @@ def _spin(factor: float) -> Patch:
 
 
 def _one_bit_less(original: Any) -> Any:
-    """Fault: a signal is converted with a bit less than stated."""
+    """Fault: a signal is converted with one bit less than stated."""
     return lambda table, *rest: original(table.model_copy(update={"bits": table.bits - 1}), *rest)
 
 

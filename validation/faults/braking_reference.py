@@ -27,12 +27,12 @@ BOUND = 1e-10
 
 
 def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60) -> Callable[[], float]:
-    """Compiled beside plain at so many states."""
+    """Check's function: largest difference between compiled and plain code at ``count`` states."""
     return lambda: laws.largest_difference(*sides(count))
 
 
 def _accelerations() -> float:
-    """Difference in accelerations of a vehicle that is built anew, with the fault."""
+    """Largest difference between the accelerations of both codes for a vehicle that is built with the fault."""
     accelerations = whole.accelerations(whole.car_with_stops.__wrapped__(), ENGINE, COUNT)
     return whole.relative_difference(accelerations, whole.plain_accelerations("bent", COUNT))
 
@@ -63,7 +63,7 @@ CHECKS = {
 
 
 def _table(change: Callable[[Handling], None]) -> Patch:
-    """The car's table of numbers changed after it was packed."""
+    """Fault: the car's table of numbers is changed after it was filled."""
 
     def packed(original: Any) -> Any:
         def make(*given: Any, **more: Any) -> Handling:
@@ -77,7 +77,8 @@ def _table(change: Callable[[Handling], None]) -> Patch:
 
 
 def _rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
-    """Rows (count, width) of a section, as they stand in the table; FIRST and COUNT name their places in its head."""
+    """View of the rows (count, width) of one section of the car's table; ``first`` and ``count`` are the places in the
+    table's head that hold its start and number of rows."""
     begin, rows = int(handling.numbers[first]), int(handling.numbers[count])
     return handling.numbers[begin : begin + width * rows].reshape(rows, width)
 
@@ -87,7 +88,7 @@ def _rows_of_parts(handling: Handling) -> np.ndarray:
 
 
 def _exchanged(handling: Handling) -> None:
-    """Stiffness and damping of the first spring."""
+    """Fault: stiffness and damping of the first spring are exchanged."""
     first = _rows_of_parts(handling)[0]
     first[[STIFFNESS, DAMPING]] = first[[DAMPING, STIFFNESS]]
 
@@ -97,7 +98,7 @@ def _without_bars(handling: Handling) -> None:
 
 
 def _neighbour(handling: Handling) -> None:
-    """Parts read from one row too late."""
+    """Fault: every spring has the stiffness of the one before it in the table."""
     parts = _rows_of_parts(handling)
     parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
 
@@ -131,18 +132,18 @@ def _preloads(change: Callable[[Preloads], Preloads]) -> Patch:
 
 
 def _first_larger(values: dict[str, float]) -> dict[str, float]:
-    """The first value 1 % larger."""
+    """The values, with the first one 1 % larger."""
     name = next(iter(values))
     return values | {name: 1.01 * values[name]}
 
 
 def _march(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
-    """A step by the engine under the forces that are held: change(step, engine, q, v)."""
+    """Patch of an engine's step under constant tyre forces; change(step, engine, q, v) replaces it."""
     return attribute("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
 
 
 def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
-    """One step by the accelerations at its start."""
+    """Fault: the engine makes a step with the accelerations at its start (explicit Euler)."""
     rates = engine.acceleration(0.0, q, v)
     q += engine.step * v
     v += engine.step * rates
@@ -162,7 +163,7 @@ def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
 
 
 def _stacked(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
-    """Tables as they are stacked for compiled code, with other mu_x and h."""
+    """Patch that gives the stacked friction tables for compiled code other mu_x and h."""
 
     def stack(original: Any) -> Any:
         return lambda tyres: _with_friction(original(tyres), change)
@@ -178,14 +179,14 @@ def _with_friction(tables: Tables, change: Callable[[Tables], tuple[np.ndarray, 
 
 
 def _heavy_wheel(original: Any) -> Any:
-    """A wheel whose inertia is 1 % too large."""
+    """Fault: a wheel's inertia is 1 % too large."""
     return lambda tables, under, motion, load, of: original(
         tables, under, motion, load, replace(of, inertia=1.01 * of.inertia)
     )
 
 
 def _other_share(original: Any) -> Any:
-    """The share of the first stretch in the place of that of the second."""
+    """Fault: the shares of the first and second stretch of road are exchanged."""
 
     def under(*given: Any) -> np.ndarray:
         surface: np.ndarray = original(*given)
@@ -197,7 +198,7 @@ def _other_share(original: Any) -> Any:
 
 
 def _more_torque(original: Any) -> Any:
-    """Torques 1 % too large."""
+    """Fault: torques are 1 % too large."""
 
     def planted(*given: Any) -> None:
         original(*given)
@@ -207,7 +208,7 @@ def _more_torque(original: Any) -> Any:
 
 
 def _late_torque(original: Any) -> Any:
-    """Torques of the start of each step at its end."""
+    """Fault: torques at a step's end are those at its start."""
 
     def planted(*given: Any) -> None:
         original(*given)
@@ -217,7 +218,7 @@ def _late_torque(original: Any) -> Any:
 
 
 def _quick_valves(original: Any) -> Any:
-    """Valves without their delay within a sample."""
+    """Fault: valves have no delay within a sample."""
 
     def planted(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
         whole_samples = sample * int(chambers.delay / sample)
@@ -227,12 +228,12 @@ def _quick_valves(original: Any) -> Any:
 
 
 def _longer_relaxation(original: Any) -> Any:
-    """Relaxation lengths 1 % too long."""
+    """Fault: relaxation lengths are 1 % too long."""
     return lambda state, time, steer, slope, length, lag: original(state, time, steer, slope, 1.01 * length, lag)
 
 
 def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
-    """Patch that changes the lag of tyres on the suspension."""
+    """Patch that changes how the slip lag of tyres is advanced on a suspension."""
     return attribute("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
 
 

@@ -27,7 +27,7 @@ class Check:
     measure: Callable[[], float]
 
     def size(self) -> float:
-        """The measured error; infinite where the fault lets a run fail."""
+        """Measured error; infinite if the fault makes a run fail."""
         try:
             return self.measure()
         except RunFailed:
@@ -45,7 +45,8 @@ class CampaignFault:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Faults in one thing, ``what``, and the checks that are run under each; ``id`` begins the ids of its rows."""
+    """Faults in one subject, named ``what``, and the checks that are run under each fault. The ids of its rows begin
+    with ``id``."""
 
     id: str
     what: str
@@ -54,7 +55,8 @@ class Campaign:
     faults: tuple[CampaignFault, ...]
 
     def measure(self, every: int = 1) -> list[Record]:
-        """Size over tolerance of every check, without a fault first and then with each, or with every such one."""
+        """Ratio of error to tolerance for every check: first without a fault, then with each planted fault, or with
+        every ``every``-th one."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
         planted = self.faults[::every]
         return [
@@ -73,7 +75,7 @@ class Campaign:
         return {name: check.size() / check.tolerance for name, check in self.checks.items()}
 
     def rows(self, records: list[Record]) -> list[Row]:
-        """Caught, false alarms, and what one check alone catches."""
+        """Rows: faults caught, false alarms, and faults that only a single check catches."""
         clean, *faulty = records
         single = [
             f"{record['fault']} ({seeing_checks(record)[0]})" for record in faulty if len(seeing_checks(record)) == 1
@@ -127,8 +129,8 @@ class Campaign:
         )
 
     def lines(self, records: list[Record]) -> list[tuple[str, ...]]:
-        """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed
-        it."""
+        """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
+        missed it."""
         return [
             (
                 self.system,
@@ -147,5 +149,5 @@ class Campaign:
 
 
 def seeing_checks(record: Record) -> list[str]:
-    """Checks that see a fault."""
+    """Names of the checks that see a fault."""
     return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]

@@ -14,17 +14,17 @@ Change = Callable[[Assembly], Assembly]
 
 
 def unchanged(assembly: Assembly) -> Assembly:
-    """No change."""
+    """The assembly itself, as a control without a fault."""
     return assembly
 
 
 def vehicle(change: Callable[[Vehicle], Vehicle]) -> Change:
-    """The description changed."""
+    """Fault: the vehicle's description is changed."""
     return lambda assembly: replace(assembly, vehicle=change(assembly.vehicle))
 
 
 def struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
-    """Each strut changed, with all struts of the vehicle at hand by name."""
+    """Fault: change(strut, struts) replaces each strut; it knows all struts of the vehicle by name."""
 
     def changed(original: Vehicle) -> Vehicle:
         named = {strut.name: strut for strut in original.struts}
@@ -34,7 +34,7 @@ def struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
 
 
 def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
-    """Each body changed, with all bodies of the vehicle at hand by name."""
+    """Fault: change(body, bodies) replaces each body; it knows all bodies of the vehicle by name."""
 
     def changed(original: Vehicle) -> Vehicle:
         named = {body.name: body for body in original.bodies}
@@ -44,7 +44,7 @@ def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
 
 
 def with_moved_points(position_of: Callable[[float, float, float], float]) -> Change:
-    """Suspension points and axles at place(x, a, b) instead of x (m)."""
+    """Fault: suspension points and axles are at position_of(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
         p, changed_vehicle = assembly.parameters, assembly.vehicle
@@ -63,7 +63,7 @@ def _point_moved_to(point: Point, x: float) -> Point:
 
 
 def swapped(first: str, other_strut: str) -> Change:
-    """Stiffness and damping of two struts exchanged."""
+    """Fault: stiffness and damping of two struts are exchanged."""
 
     def change(strut: Strut, struts: dict[str, Strut]) -> Strut:
         source = struts.get({first: other_strut, other_strut: first}.get(strut.name, strut.name), strut)
@@ -73,28 +73,28 @@ def swapped(first: str, other_strut: str) -> Change:
 
 
 def stiffened(name: str, factor: float) -> Change:
-    """One strut's stiffness times a factor."""
+    """Fault: the stiffness of one strut is multiplied by a factor."""
     return struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
 
 
 def undamped_tyre(strut: Strut, struts: dict[str, Strut]) -> Strut:
-    """A tyre without its damping."""
+    """Fault: a tyre has no damping."""
     return replace(strut, damping=0.0) if strut.name.startswith("tyre") else strut
 
 
 def swapped_wheel(body: Body, bodies: dict[str, Body]) -> Body:
-    """A wheel with the mass of the other one."""
+    """Fault: a wheel has the mass of the other wheel."""
     other = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
     return replace(body, mass=bodies[other].mass)
 
 
 def mixed_inertia(body: Body, bodies: dict[str, Body]) -> Body:
-    """The chassis with its inertia for its mass, and the other way round."""
+    """Fault: mass and inertia of the chassis are exchanged."""
     return body if body.pitch_inertia is None else replace(body, mass=body.pitch_inertia, pitch_inertia=body.mass)
 
 
 def inertia_about_axle(assembly: Assembly) -> Assembly:
-    """Pitch inertia about the front axle instead of the centre of mass."""
+    """Fault: the pitch inertia is taken about the front axle instead of the centre of mass."""
     b = assembly.parameters.b
 
     def change(body: Body, bodies: dict[str, Body]) -> Body:
@@ -105,14 +105,14 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
 
 
 def unstressed_start(assembly: Assembly) -> Assembly:
-    """Heave starts at zero instead of the static equilibrium."""
+    """Fault: heave starts at zero instead of the static equilibrium."""
     start = assembly.initial.copy()
     start[:3] = 0.0
     return replace(assembly, initial=start)
 
 
 def body_fixed(assembly: Assembly) -> Assembly:
-    """Wheel forces that turn with the chassis where vertical ones were asked for."""
+    """Fault: wheel forces turn with the chassis, although vertical forces were specified."""
     return replace(assembly, mode="force-body") if assembly.mode == "force" else assembly
 
 
@@ -121,7 +121,7 @@ Values = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class AlteredSignal:
-    """A signal read ``late`` (s) and passed through ``change``, values (n, channels) -> values."""
+    """Fault: a signal is delayed by ``late`` (s), and its values (n, channels) are replaced by change(values)."""
 
     signal: Any
     late: float = 0.0
@@ -141,10 +141,10 @@ class AlteredSignal:
 
 @dataclass(frozen=True)
 class HeldStages(AlteredSignal):
-    """A signal whose reading in the middle of a step is the one at its start."""
+    """Fault: a signal's value in the middle of a step is that at the step's start."""
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, every second one repeated, shape (count, channels)."""
+        """Values (count, channels) at start + i step, where every second one repeats the one before."""
         values = self.signal.sample(start, step, count)
         values[1::2] = values[:-1:2]
         return values
@@ -152,10 +152,10 @@ class HeldStages(AlteredSignal):
 
 @dataclass(frozen=True)
 class OtherTrack(AlteredSignal):
-    """The road of one track where the mean was asked for: it differs by a class A road."""
+    """Fault: the road is one track instead of the mean of both; it differs from the mean by a class A road."""
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Values at start + i step, shape (count, 4)."""
+        """Values (count, 4) of the road at start + i step: heights, then their rates."""
         return self.signal.sample(start, step, count) + self._other_profile().sample(start, step, count)
 
     def at(self, time: float) -> np.ndarray:
@@ -167,7 +167,7 @@ class OtherTrack(AlteredSignal):
 
 
 def driven(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
-    """The input changed where the vehicle is driven in one of the modes."""
+    """Fault: the input signal is replaced, if the vehicle is driven in one of the modes."""
 
     def changed(assembly: Assembly) -> Assembly:
         if assembly.input is None or assembly.mode not in modes:
@@ -178,12 +178,12 @@ def driven(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
 
 
 def channels(modes: tuple[str, ...], change: Values) -> Change:
-    """The values of the input changed."""
+    """Fault: the input's values are replaced by change(values)."""
     return driven(modes, lambda signal: AlteredSignal(signal, 0.0, change))
 
 
 def times(factors: dict[int, float]) -> Values:
-    """Channels by number, times a factor each; the others stay."""
+    """Function that multiplies some channels, given by number, by a factor; other channels stay."""
 
     def change(values: np.ndarray) -> np.ndarray:
         out = values.copy()
@@ -195,19 +195,19 @@ def times(factors: dict[int, float]) -> Values:
 
 
 def springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
-    """Every pitch spring replaced."""
+    """Fault: every pitch spring is replaced."""
     return vehicle(
         lambda original: replace(original, pitch_springs=tuple(change(spring) for spring in original.pitch_springs))
     )
 
 
 def front_twice(values: np.ndarray) -> np.ndarray:
-    """The rear channel filled from the front one."""
+    """Fault: the rear channel has the values of the front one."""
     return values[:, [0, 0, *range(2, values.shape[1])]]
 
 
 def moment(periods: float, change: Values = lambda values: values) -> Change:
-    """The added moment late by a part of its sampling period, and its values changed."""
+    """Fault: the added moment is delayed by a fraction of its sampling period, and its values are changed."""
 
     def changed(assembly: Assembly) -> Assembly:
         signal = assembly.moment
@@ -219,12 +219,12 @@ def moment(periods: float, change: Values = lambda values: values) -> Change:
 
 
 def with_late_input(periods: float, step: float = 1e-3) -> Change:
-    """Input late by a part of its sampling period, or of a step of 1 ms where it has none."""
+    """Fault: the input is delayed by a fraction of its sampling period, or of a 1 ms step if it is not sampled."""
     return driven(("road", "force", "pitch"), lambda signal: AlteredSignal(signal, periods * (signal.period or step)))
 
 
 def road(**factors: float) -> Change:
-    """Numbers of the road signal (speed, wheelbase) times a factor."""
+    """Fault: numbers of the road signal (speed, wheelbase) are multiplied by a factor."""
     return driven(
         ("road",),
         lambda signal: replace(signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}),

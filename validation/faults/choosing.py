@@ -44,15 +44,15 @@ def _run() -> ChoiceQuestion:
 
 
 def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
-    """The linear scene's choice by the functions that are in place now, its changes (quantities,) by frequency, and its
-    largest change nearby."""
+    """The choice for the linear scene with the functions that are in place now (faulty or not), its changes
+    (quantities,) by frequency responses, and the largest change near the scene."""
     return _linear_choice_with_functions(
         LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted
     )
 
 
 def _by_runs() -> JudgedByRuns:
-    """The choice by runs for the half car."""
+    """The choice by runs for the half car, judged by two further runs."""
     return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.shares)
 
 
@@ -70,19 +70,20 @@ def _choice_with_functions(*functions: Any) -> JudgedByRuns:
 
 
 def _variances() -> float:
-    """Reported changes against sums over frequencies."""
+    """Largest difference of the reported changes from those by sums over frequencies."""
     choice, by_frequency, _ = _by_frequency()
     return float(np.abs(by_frequency - choice.confirmed).max())
 
 
 def _reported_change() -> float:
-    """Largest change of the quantities reported as within tolerance, by frequency, divided by the tolerance."""
+    """Ratio of the largest change by frequency responses to the tolerance, if the choice is reported as within it."""
     choice, by_frequency, _ = _by_frequency()
     return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear().tolerance
 
 
 def _predicted() -> float:
-    """Octaves between predictions and changes by frequency; infinite for another sign."""
+    """Largest difference in octaves between predicted changes and those by frequency responses; infinite if the sign is
+    wrong."""
     choice, by_frequency, _ = _by_frequency()
     with np.errstate(invalid="ignore", divide="ignore"):
         octaves = np.abs(np.log2(choice.predicted / by_frequency)).max()
@@ -90,19 +91,19 @@ def _predicted() -> float:
 
 
 def _unreported_change() -> float:
-    """Largest change at random speeds and parameters, by the largest one that is reported."""
+    """Ratio of the largest change at random speeds and parameters to the largest change that is reported."""
     choice, _, nearby = _by_frequency()
     return nearby / float(np.abs(choice.off).max())
 
 
 def _runs() -> float:
-    """Reported changes of a half car against two runs more."""
+    """Largest difference of the reported changes of a half car from those by two further runs."""
     by_runs = _by_runs()
     return float(np.abs(by_runs.again - by_runs.choice.confirmed).max())
 
 
 def _runs_kept() -> float:
-    """Change by two runs more of what is reported as kept, by the tolerance that was asked for."""
+    """Ratio of the largest change by two further runs to the tolerance, if the choice is reported as within it."""
     by_runs = _by_runs()
     return by_runs.choice.within_tolerance * float(by_runs.again.max()) / _run().tolerance
 

@@ -28,20 +28,20 @@ PUBLISHED = (4.12, 3.67, 1.47)
 
 
 def _ball() -> tuple[float, float, float]:
-    """Radius (m), approach (m) and greatest pressure (Pa) of a ball on a plane, in closed form."""
+    """Radius (m) of the contact, approach (m) and peak pressure (Pa) of a ball on a plane, in closed form."""
     stiff = STEEL.E / (2.0 * (1.0 - STEEL.nu**2))
     a = (0.75 * LOAD * RADIUS / stiff) ** (1.0 / 3.0)
     return a, a * a / RADIUS, 1.5 * LOAD / (np.pi * a * a)
 
 
 def _hertz() -> float:
-    """Hertz's ball: radius, approach, greatest pressure."""
+    """Errors of Hertz's theory for a ball on a plane: radius, approach, peak pressure."""
     answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
     return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
 
 
 def _ellipse() -> float:
-    """Ellipse of unlike curvatures: load by the integral of its pressure, 2/3 pi a b p0, and its longer axis."""
+    """Errors for an ellipse: its load against the integral of its pressure, 2/3 pi a b p0, and which axis is longer."""
     answer = hertz.by_load(2.0, 1.0, LOAD, PAIR)
     balanced = abs(float(2.0 / 3.0 * np.pi * answer.a * answer.b * answer.p0) / LOAD - 1.0)
     return balanced if answer.b > answer.a else np.inf
@@ -54,13 +54,13 @@ def _normal_solution() -> NormalSolution:
 
 
 def _normal() -> float:
-    """Ball on cells against the closed form: approach and greatest pressure."""
+    """Errors of the numerical normal solution for a ball: approach and peak pressure against the closed form."""
     answer = _normal_solution()
     return largest_relative_difference(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
 
 
 def _published() -> float:
-    """Forces of small creepages and spin by Kalker's published coefficients."""
+    """Errors of forces at small creepages and spin, against Kalker's published coefficients."""
     soft = MaterialPair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
     a, shear = 5e-3, 1e11
     motion = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
@@ -71,20 +71,20 @@ def _published() -> float:
 
 
 def _against_linear_theory() -> float:
-    """Small creepages on an ellipse against the linear theory: all of them, 41 cells."""
+    """Errors of forces on an ellipse with 41 cells at small creepages, against the linear theory."""
     motion = (1e-7, 0.7e-7, 2e-5)
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=41)
     return largest_relative_difference(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
 
 
 def _sliding() -> float:
-    """Gross sliding against mu N, and its direction."""
+    """Errors in gross sliding: force against mu N, and its direction."""
     answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, 0.03, 0.04, 0.0), PAIR)
     return largest_relative_difference(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
 
 
 def _theories() -> float:
-    """Exact theory and FASTSIM under creepages that slip in part, divided by mu N."""
+    """Difference between exact theory and FASTSIM for contacts that slip in part, divided by mu N."""
     pressed, a = _normal_solution(), _ball()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
     exact = rolling_problem.solve_rolling(pressed, MU, *motion, PAIR)
@@ -99,7 +99,7 @@ def _stuck() -> Array:
 
 
 def _exact_against_linear() -> float:
-    """Exact theory under small creepages against the linear one."""
+    """Difference between the exact theory at small creepages and the linear theory."""
     exact = rolling_problem.solve_rolling(_normal_solution(), MU, 2e-5, 1e-5, 0.0, PAIR)
     return largest_relative_difference(np.array([exact.fx, exact.fy]), _stuck())
 
@@ -117,7 +117,7 @@ CHECKS = {
 
 
 def _contacts(change: Callable[[Array], None]) -> Patch:
-    """CONTACT (n,) of FASTSIM changed in place."""
+    """Patch that changes FASTSIM's input CONTACT (n,) in place."""
 
     def contacts(original: Any) -> Any:
         def made(*given: Any) -> Any:

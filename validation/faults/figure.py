@@ -21,7 +21,8 @@ def fault_map(
     titles: dict[str, str],
     hidden: Sequence[bool],
 ) -> Figure:
-    """Cells of log10(size over tolerance) by vehicle; white where a check does not see the fault.
+    """Coloured table of log10(error / tolerance) for each vehicle, with faults as rows and checks as columns; white
+    where a check does not see the fault.
 
     ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
     """

@@ -17,12 +17,12 @@ from validation.spatial.cars import by_jacobians, r19, static
 
 
 def _driven(hubs: np.ndarray) -> HubModel:
-    """R19-free in MuJoCo with these wrenches (3, 6 h) on its hubs."""
+    """R19-free in MuJoCo, driven by these wrenches (3, 6 h) on its hubs."""
     return build("mujoco", r19(), HubInputs(hubs), 1e-3, 1e-3)
 
 
 def _jacobians() -> float:
-    """Joint forces of wrenches on every hub beside MuJoCo's own, at coordinates far from rest."""
+    """Relative difference of the generalised forces of hub wrenches from those by MuJoCo's Jacobians, far from rest."""
     vehicle, rows = r19(), static(r19(), 3).hubs
     rows += np.random.default_rng(4).normal(0.0, 500.0, rows.shape[1])
     q = np.random.default_rng(5).uniform(-0.03, 0.03, vehicle.size)
@@ -34,7 +34,7 @@ def _jacobians() -> float:
 
 
 def _accelerations_at_rest() -> float:
-    """Accelerations at rest on the static loads (m/s^2, rad/s^2)."""
+    """Largest acceleration at rest under the static loads (m/s^2, rad/s^2), which should be 0."""
     rest = np.zeros(r19().size)
     return float(np.abs(_driven(static(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
 
@@ -46,7 +46,7 @@ CHECKS = {
 
 
 def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = "hub") -> Patch:
-    """Wrenches (rows, hubs, 6) changed where they are read, or read in another frame."""
+    """Fault: wrenches (rows, hubs, 6) are changed as they are read, or read in another frame."""
 
     def table(original: Any) -> Any:
         def made(vehicle: CutVehicle, hub_inputs: HubInputs, step: float) -> Any:

@@ -34,7 +34,7 @@ UNITS = {
 
 
 def _streams() -> float:
-    """Largest correlation of streams of two paths and two sources, in standard errors."""
+    """Largest correlation between the noise streams of two paths and two sources, in standard errors."""
     streams = [
         noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
         for path in (0, 1)
@@ -44,19 +44,19 @@ def _streams() -> float:
 
 
 def _variance() -> float:
-    """Variance of a stream against 1, in standard errors."""
+    """Difference of a noise stream's variance from 1, in standard errors."""
     stream = noise.normal(3, 0, noise.BLOCK, 1)
     return abs(float(np.mean(stream**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
 
 
 def _stream_difference() -> float:
-    """Difference between a stream read in pieces and read whole."""
+    """Difference between a noise stream read in pieces and as a whole."""
     parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
     return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
 
 
 def _damage() -> float:
-    """Damage of the standard's load at slopes 1 and 5 by its printed cycles."""
+    """Error of the damage of the standard's load at slopes 1 and 5, against that of its printed cycles."""
     return max(
         abs(damage.pseudo_damage(LOAD, slope) / sum(n * size**slope for size, n in PRINTED.items()) - 1.0)
         for slope in (1.0, 5.0)
@@ -64,20 +64,20 @@ def _damage() -> float:
 
 
 def _pairs() -> float:
-    """Range pairs of the standard's load by its printed cycles."""
+    """Error of the range pairs of the standard's load, against its printed cycles."""
     counts = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
     return largest_relative_difference(counts, np.array([3.5, 3.5, 0.5]))
 
 
 def _crossings() -> float:
-    """Crossings of the standard's load: through 0, 2 and 4.5, counted by hand."""
+    """Error of the level crossings of the standard's load at 0, 2 and 4.5, against counts by hand."""
     return largest_relative_difference(
         counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
     )
 
 
 def _units() -> float:
-    """Factors of units."""
+    """Errors of unit conversion factors."""
     return max(
         abs(units.conversion(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
         for (unit, quantity), wanted in UNITS.items()
@@ -85,7 +85,7 @@ def _units() -> float:
 
 
 def _clock() -> float:
-    """A sine of 2 Hz at 200 Hz and at 4 kHz onto 1 kHz, by its amplitude."""
+    """Error, relative to the amplitude, of a 2 Hz sine resampled from 200 Hz and from 4 kHz to 1 kHz."""
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
         times = np.arange(round(1.5 * rate)) / rate
@@ -95,14 +95,15 @@ def _clock() -> float:
 
 
 def _gap() -> float:
-    """Points that are numbers within a gap of ten samples, of nine."""
+    """Number of resampled points inside a gap of nine missing samples that are finite; it should be 0."""
     times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
     values = resampling.resample_to(times, times, 0.01, np.arange(41, 48) / 100.0)
     return float(np.isfinite(values).sum())
 
 
 def _sections() -> float:
-    """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
+    """Error of the section forces in the body's axes for an upward force, with the body standing on its tail and with
+    its nose 30 degrees up."""
     forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
     have = np.concatenate([forces[name] for name in score.CHANNELS])
     return largest_relative_difference(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
@@ -110,7 +111,8 @@ def _sections() -> float:
 
 @cache
 def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
-    """Sensors on a body that nods and rises: their array, readings (n, 4, 3), pitch (n,) and acceleration up."""
+    """Sensors on a body that pitches and heaves: their array, readings (n, 4, 3), pitch (n,) and vertical
+    acceleration."""
     t = PERIOD * np.arange(COUNT)
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
@@ -122,7 +124,7 @@ def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _motion() -> float:
-    """Rates and vertical acceleration of that body from the readings."""
+    """Errors of the rates and the vertical acceleration of this body that are computed from the readings."""
     array, read, _, heave = _turning()
     moved_body = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
@@ -139,14 +141,14 @@ def _rigid() -> float:
 
 
 def _road() -> float:
-    """Variance of a road of class C by the standard's density, integrated over the band by hand."""
+    """Error of the variance of a class C road, against the standard's density integrated by hand."""
     road = iso8608.iso8608_road("C", 1, waves=400)
     wanted = 256e-6 * 0.1**2 * (1.0 / 0.011 - 1.0 / 2.83)
     return abs(0.5 * float(np.sum(road.amplitude**2)) / wanted - 1.0)
 
 
 def _levels() -> float:
-    """Two-sided level of class C over rad/m: pi n0^2 Gd."""
+    """Error of the two-sided level of class C over rad/m, which is pi n0^2 Gd."""
     return abs(iso8608.level_of_class("C") / (np.pi * 0.01 * 256e-6) - 1.0)
 
 
@@ -169,7 +171,7 @@ CHECKS = {
 
 
 def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
-    """Blocks of noise drawn for another (seed, path, block, channels, source)."""
+    """Fault: noise blocks are drawn for changed values of (seed, path, block, channels, source)."""
     return attribute(
         "models.core.noise:normal_block",
         lambda real: (
@@ -195,12 +197,12 @@ def _factor(name: str, factor: float) -> Patch:
 
 
 def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
-    """Spans, means and counts of the cycles changed."""
+    """Fault: spans, means and counts of the cycles are changed."""
     return attribute("models.fatigue.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
 
 
 def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    """Readings (n, 4, 3) of all sensors changed before motion is made of them."""
+    """Fault: the sensors' readings (n, 4, 3) are changed before motion is computed from them."""
     return attribute(
         "models.sensors.rigid_body_motion:spin",
         lambda real: (

@@ -32,7 +32,7 @@ CHECKS = {
 
 
 def _in_model(change: Callable[[Any], None]) -> Patch:
-    """A change of MuJoCo's compiled model after its laws were written."""
+    """Fault: MuJoCo's compiled model is changed after its force laws were written into it."""
 
     def set_laws(original: Any) -> Any:
         def written(model: Any, parts: Any) -> None:
@@ -46,7 +46,7 @@ def _in_model(change: Callable[[Any], None]) -> Patch:
 
 
 def _scale(array: str) -> Patch:
-    """The first row of an array of the model, 1 % larger."""
+    """Fault: the first row of an array of the model is 1 % larger."""
 
     def change(model: Any) -> None:
         getattr(model, array)[:1] *= 1.01
@@ -55,18 +55,18 @@ def _scale(array: str) -> Patch:
 
 
 def _bar_tendon(model: Any) -> None:
-    """The first coordinate of the first bar counts 1 % more."""
+    """Fault: the coefficient of the first coordinate in the first anti-roll bar's tendon is 1 % too large."""
     bar = next(i for i in range(model.ntendon) if model.tendon(i).name.endswith("bar"))
     model.wrap_prm[model.tendon_adr[bar]] *= 1.01
 
 
 def _site_actuator(model: Any) -> int:
-    """The first actuator between two sites."""
+    """Number of the first actuator that acts between two sites."""
     return int(np.argmax(model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE))
 
 
 def _swap_sites(model: Any) -> None:
-    """The reference site sits on the body that is carried: the axis turns with that."""
+    """Fault: an actuator's reference site lies on the other body, so that its axis turns with this body."""
     sites = model.actuator_trnid[_site_actuator(model)]
     sites[:] = sites[::-1].copy()
 
@@ -78,12 +78,12 @@ def _mount_preload(model: Any) -> None:
 
 
 def _corner(model: Any) -> None:
-    """A corner of a curve is not cut off."""
+    """Fault: the force limit of an actuator, which represents a corner of a curve, is switched off."""
     model.actuator_forcelimited[int(np.argmax(model.actuator_forcelimited))] = 0
 
 
 def _law(**factors: float) -> Patch:
-    """Stiffness, damping or preload of the first of Exudyn's elements by a factor."""
+    """Fault: stiffness, damping or preload of Exudyn's first element is multiplied by a factor."""
 
     def add_parts(original: Any) -> Any:
         def added(built: Any, node: Any, parts: Any) -> None:
@@ -97,7 +97,7 @@ def _law(**factors: float) -> Patch:
 
 
 def _bar_factor(original: Any) -> Any:
-    """The first coordinate of a bar counts 1 % more."""
+    """Fault: the coefficient of the first coordinate in a bar is 1 % too large."""
 
     def add(self: Any, element: Any, travel: Any) -> None:
         first, *others = travel.factors
@@ -108,7 +108,7 @@ def _bar_factor(original: Any) -> Any:
 
 
 def _in_space(original: Any) -> Any:
-    """Mounts are measured along axes of the space: the connector hangs on the vehicle's tree."""
+    """Fault: mounts are measured along axes fixed in space, since the connector belongs to the vehicle's tree."""
 
     def tree(self: Any, frame: str) -> Any:
         return self.built.links[frame][0]

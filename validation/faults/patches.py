@@ -21,12 +21,12 @@ Pair = tuple[float, float]
 
 
 def no_fault() -> Context:
-    """No fault."""
+    """Patch that plants no fault."""
     return nullcontext
 
 
 def attribute(path: str, change: Callable[[Any], Any]) -> Patch:
-    """``module:object.name`` replaced by change(what is there)."""
+    """Patch that replaces ``module:object.name`` by change(original)."""
 
     def prepare() -> Context:
         owner, name = _owner(path)
@@ -55,7 +55,7 @@ def with_globals(function: Callable[..., Any], **others: Any) -> Callable[..., A
 
 
 def index_of_the_end(original: Any) -> Any:
-    """Held samples: a step reads the sample of its end."""
+    """Fault: with held samples, a step reads the sample at its end."""
 
     def advance(clock: Any, mbs: Any, t: float) -> bool:
         clock.step = min(round(t * clock.per_time / 2), len(clock.steps[0]) - 1)
@@ -65,7 +65,7 @@ def index_of_the_end(original: Any) -> Any:
 
 
 def truncated_time(original: Any) -> Any:
-    """Table of half steps: the row is cut off instead of rounded."""
+    """Fault: in the table of half steps the row number is truncated instead of rounded."""
 
     def reader(clock: Any, column: int, scale: float) -> Any:
         if not clock.table:
@@ -76,7 +76,8 @@ def truncated_time(original: Any) -> Any:
 
 
 def reset_accelerations(original: Any) -> Any:
-    """Start of a constrained run: Exudyn finds its initial accelerations without the constraint's own."""
+    """Fault: a constrained run starts with accelerations that Exudyn finds without the constraint's own
+    acceleration."""
 
     def start(model: Any, options: Any) -> None:
         original(model, options)
@@ -90,7 +91,7 @@ def reset_accelerations(original: Any) -> Any:
 
 
 def weightless_wheel(original: Any) -> Any:
-    """Gravity missing on the front wheel."""
+    """Fault: the front wheel has no weight."""
 
     def spec(*arguments: Any) -> Any:
         built = original(*arguments)
@@ -101,7 +102,7 @@ def weightless_wheel(original: Any) -> Any:
 
 
 def turning_reference(original: Any) -> Any:
-    """Struts measured along the axis of the chassis: the reference site sits on the body that rotates."""
+    """Fault: struts are measured along the chassis' axis, because the reference site lies on the rotating body."""
 
     def suspension(spec: Any, vehicle: Any, strut: Any, joints: Any) -> None:
         original(spec, vehicle, strut, joints)
@@ -112,7 +113,7 @@ def turning_reference(original: Any) -> Any:
 
 
 def misprinted_row(original: Any) -> Any:
-    """Prescribed pitch: the chassis' row of eq. (39) with the other sign."""
+    """Fault: with a prescribed pitch, the chassis' row of eq. (39) has the wrong sign."""
 
     def guidance(*arguments: Any) -> np.ndarray:
         forces = original(*arguments)
@@ -123,12 +124,12 @@ def misprinted_row(original: Any) -> Any:
 
 
 def not_installed(original: Any) -> Any:
-    """The block of an installed callback without the callback."""
+    """Fault: the context that installs a callback does not install it."""
     return lambda law: nullcontext()
 
 
 def negative(original: Any) -> Any:
-    """A method's result with the other sign, where it has one."""
+    """Fault: a method's result has the opposite sign."""
 
     def method(*arguments: Any) -> Any:
         answer = original(*arguments)
@@ -141,7 +142,7 @@ def negative(original: Any) -> Any:
 
 
 def rewritten(**functions: Callable[[], Any]) -> Patch:
-    """The reference interpreted instead of compiled, with functions of its equations replaced."""
+    """Patch that runs the reference without compilation, with some functions of its equations replaced."""
 
     def prepare() -> Context:
         from models.engines import reference
@@ -165,7 +166,7 @@ def _patched(changes: dict[Any, dict[str, Any]]) -> Iterator[None]:
 
 
 def moment_without_cosine() -> Any:
-    """b f3 - a f4 in the place of cos(beta) (b f3 - a f4)."""
+    """Fault: the moment is b f3 - a f4 instead of cos(beta) (b f3 - a f4)."""
     original = equations.newton_euler
 
     def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
@@ -175,7 +176,7 @@ def moment_without_cosine() -> Any:
 
 
 def no_reaction() -> Any:
-    """The suspension pushes the chassis but not the front wheel."""
+    """Fault: the suspension force acts on the chassis, but not on the front wheel."""
     original = equations.newton_euler
 
     def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
@@ -186,13 +187,13 @@ def no_reaction() -> Any:
 
 
 def damper_without_cosine() -> Any:
-    """Dampers see b beta' instead of b beta' cos(beta)."""
+    """Fault: dampers use b beta' instead of b beta' cos(beta)."""
     original = equations.suspension
     return lambda y, p, sine, cosine: original(y, p, sine, 1.0)
 
 
 def stale_state() -> Any:
-    """Suspension forces from the state of the evaluation before."""
+    """Fault: suspension forces are computed from the state of the previous evaluation."""
     original, before = equations.suspension, []
 
     def suspension(y: Any, p: Any, sine: float, cosine: float) -> Any:

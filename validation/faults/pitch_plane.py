@@ -35,7 +35,7 @@ def measure(
     clean: Sequence[EngineFault] = CLEAN,
     vehicles: Sequence[str] = (TWIN, SYMMETRIC),
 ) -> Saved:
-    """Records of engines without a fault and with each of some, on some vehicles, under every check."""
+    """Records of engines without faults and with each planted fault, for every check on every vehicle."""
     benches = [Bench(name, DURATION) for name in vehicles]
     return {
         name: [_record(fault, benches) for fault in planted_here]
@@ -44,7 +44,7 @@ def measure(
 
 
 def _record(fault: EngineFault, benches: list[Bench]) -> Saved:
-    """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
+    """Ratio of error to tolerance for every check, by vehicle and engine; None for a refused or failed run."""
     ratios = {
         bench.parameters: {
             engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
@@ -70,12 +70,12 @@ PLACES = {
 
 
 def seen(record: Saved, check: str, vehicle: str = TWIN) -> bool:
-    """Whether a check sees the fault in every engine that it was planted in."""
+    """Whether a check sees the fault in every engine in which it is planted."""
     return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(record, check, vehicle))
 
 
 def least(record: Saved, check: str, vehicle: str) -> float:
-    """Smallest size over tolerance among the engines; infinite for refused runs."""
+    """Smallest ratio of error to tolerance among the engines; infinite for refused runs."""
     return min(math.inf if ratio is None else ratio for ratio in _ratios_of_check(record, check, vehicle))
 
 
@@ -90,7 +90,8 @@ def caught(record: Saved, vehicle: str = TWIN) -> bool:
 
 
 def rows(data: Saved) -> list[Row]:
-    """Caught, false alarms, hidden by symmetry where both vehicles ran, and what one check alone catches."""
+    """Rows: faults caught, false alarms, faults that the symmetric vehicle hides (if both vehicles ran), and faults
+    that only one check catches."""
     clean, faulty = data["clean"], data["faults"]
     alarms = sum(
         ratio is None or ratio > 1
@@ -139,7 +140,8 @@ def _hidden(faulty: list[Saved]) -> Row:
 
 
 def lines(data: Saved) -> list[tuple[str, ...]]:
-    """A line for every fault: system, the part with the fault, fault, checks that see it, checks that had missed it."""
+    """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
+    missed it."""
     return [
         (
             "pitch-plane",
@@ -153,7 +155,7 @@ def lines(data: Saved) -> list[tuple[str, ...]]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """The checks with their tolerances, and every fault with what sees it."""
+    """Tables of the checks with their tolerances, and of every fault with the checks that see it."""
     return [_check_table(data), _fault_table(data)]
 
 
@@ -208,7 +210,7 @@ def _fault_table(data: Saved) -> Table:
 
 
 def _size(record: Saved, name: str) -> str:
-    """The smaller size among the engines, from its ratio to the tolerance."""
+    """Text with the check's smallest error among the engines, from its ratio to the tolerance."""
     sizes = [
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
         for engine, ratios in record["ratios"][TWIN].items()
@@ -218,7 +220,7 @@ def _size(record: Saved, name: str) -> str:
 
 
 def draw(data: Saved) -> Drawn:
-    """How far above its tolerance each check stands, fault by fault, on both vehicles where both ran."""
+    """Plot how far above its tolerance each check's error is for every fault, on both vehicles if both ran."""
     if not _has_symmetric_vehicle(data):
         return []
     from validation.faults.figure import fault_map

@@ -31,7 +31,7 @@ def _as_asked(settings: Settings) -> Settings:
 
 @dataclass(frozen=True)
 class EngineFault:
-    """A fault in words, the engines it is planted in, and what it changes before or while they work."""
+    """A fault: its description, the engines in which it is planted, and what it changes before or during a run."""
 
     name: str
     engines: tuple[str, ...]
@@ -42,7 +42,7 @@ class EngineFault:
 
 @dataclass
 class Planted:
-    """A model with a fault in it, which is alive only while the model works."""
+    """An engine's model with a fault that is active only while the model computes."""
 
     context: Context
     model: Model
@@ -63,7 +63,7 @@ class Planted:
 
 
 def planted(fault: EngineFault, engine: str) -> Make:
-    """The engine with the fault, as the checks take it."""
+    """A function that builds models with the fault in an engine, in the form that the checks expect."""
 
     def make(assembly: Assembly, settings: Settings) -> Planted:
         context = fault.inside()
@@ -74,7 +74,7 @@ def planted(fault: EngineFault, engine: str) -> Make:
 
 
 def _euler(settings: Settings) -> Settings:
-    """A first-order integrator where Runge-Kutta was asked for."""
+    """Fault: a first-order integrator is used instead of Runge-Kutta."""
     lower = {"RK44": "ExplicitEuler", "RK4": "Euler"}
     return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
 

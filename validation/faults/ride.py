@@ -46,12 +46,13 @@ def _by_frequency() -> np.ndarray:
 
 
 def _quadrature() -> float:
-    """Variances of the half car against the integrals over its spectra."""
+    """Errors of the half car's variances against integrals over its spectra."""
     return off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
 
 
 def _closed_form() -> float:
-    """Body acceleration of the quarter car on a road of one state, from the values of its file."""
+    """Error of the quarter car's body acceleration on a first-order road, against a closed form with the values of its
+    file."""
     q, corner = 1e-4, 0.3
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     variance = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
@@ -69,7 +70,8 @@ def _covariance_of_heights() -> np.ndarray:
 
 
 def _heights() -> float:
-    """Road under the wheels of R19-ride, through filters and delays, against its covariance in closed form."""
+    """Errors of the road heights under the wheels of R19-ride by filters and delays, against their covariance in closed
+    form."""
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
     no, unit = np.zeros(len(vehicle.mass)), np.eye(len(vehicle.wheels))
     left = sum(unit[i] for i, wheel in enumerate(vehicle.wheels) if wheel.y > 0)
@@ -83,19 +85,20 @@ def _heights() -> float:
 
 
 def _published_road() -> float:
-    """Variance of a track of the paper's road: pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
+    """Error of the variance of one track of the paper's road, against pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
     covariance = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
     return off(covariance, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
 def _frequencies() -> float:
-    """19 eigenfrequencies of R19-ride as its data have them."""
+    """Errors of the 19 eigenfrequencies of R19-ride, against those that belong to its data."""
     rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
     return off(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
 def _whole_inertia() -> float:
-    """Inertia of body and engine of R19-free about their common centre, by its largest entry."""
+    """Error of the inertia of R19-free's body and engine about their common centre of mass, relative to the largest
+    entry."""
     vehicle = vehicle_file.load_vehicle("r19_free")
     parts = [vehicle.body(name) for name in ("body", "engine")]
     centre = sum(part.mass * np.array(part.position) for part in parts) / sum(part.mass for part in parts)
@@ -113,13 +116,13 @@ def _by_hand(name: str) -> np.ndarray:
 
 
 def _state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Small positions, rates and road: no two alike, so that nothing cancels."""
+    """A small state with coordinates, rates and road that are all different, so that no errors cancel."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
     return 1e-7 * np.cos(np.arange(n)), 1e-6 * np.sin(1.0 + np.arange(n)), 1e-7 * np.cos(0.7 * np.arange(2 * w))
 
 
 def _equations() -> float:
-    """Accelerations of R19-ride and R19-free at a small state against the equations written by hand."""
+    """Errors of the accelerations of R19-ride and R19-free at a small state, against equations written by hand."""
     sizes = []
     for name in ("r19_ride", "r19_free"):
         vehicle = vehicle_file.load_vehicle(name)
@@ -132,7 +135,7 @@ def _equations() -> float:
 
 
 def _states_of_weighting() -> float:
-    """Wk's states against the formulas of its sections, at eight frequencies."""
+    """Errors of the filter states of Wk at eight frequencies, against the formulas of its sections."""
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
     response = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
@@ -140,7 +143,7 @@ def _states_of_weighting() -> float:
 
 
 def _table_of_weighting() -> float:
-    """Wk against the standard's table, relative."""
+    """Relative errors of Wk against the standard's table."""
     frequency, wk, _ = np.array(STANDARD).T
     return off(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
 
@@ -159,14 +162,14 @@ CHECKS = {
 
 
 def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
-    """Every vehicle that is loaded changed."""
+    """Fault: every vehicle is changed as it is loaded."""
     return attribute(
         "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change(real(*arguments))
     )
 
 
 def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
-    """Every system changed, with its speed at hand."""
+    """Fault: change(system, speed) replaces every excited linear system."""
     return attribute("models.ride.excited:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed))
 
 
@@ -192,7 +195,7 @@ def _other_twist(original: Any) -> Any:
 
 
 def _mirrored(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """Places of the centre of mass by axle exchanged: the heaviest body lies as far behind as it lay before."""
+    """Fault: the heaviest body's centre of mass is as far behind the middle as it was ahead of it."""
     heavy = max(vehicle.bodies, key=lambda body: body.mass)
     x, y, z = heavy.position
     moved = replace(heavy, position=(vehicle.axles[0] + vehicle.axles[-1] - x, y, z))
@@ -200,7 +203,7 @@ def _mirrored(vehicle: SpatialVehicle) -> SpatialVehicle:
 
 
 def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:
-    """Products of inertia with the other sign."""
+    """Fault: products of inertia have the opposite sign."""
 
     def tensor(inertia: Any) -> Any:
         return tuple(map(tuple, 2.0 * np.diag(np.diag(inertia)) - np.array(inertia)))

@@ -17,7 +17,7 @@ from validation.spatial.cars import cornering_error, mirrored
 
 
 def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
-    """R19-free in a turn at 25 m/s, and a state in it."""
+    """The vehicle R19-free steered into a turn at 25 m/s, and a state within the turn."""
     car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
     q, v = car.straight(25.0)
     places, part = car.vehicle.coordinates(), np.sign(steer)
@@ -55,7 +55,7 @@ def _read(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _balance() -> float:
-    """Change of the energy along the motion, less the powers."""
+    """Error of the energy balance along the motion, divided by the largest power of a tyre."""
     car, q, v = turning()
     a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read(car, q, v)
     ends = [
@@ -67,7 +67,7 @@ def _balance() -> float:
 
 
 def _sliding() -> float:
-    """Check of locked wheels: deviation of their force from mu N against the sliding velocity."""
+    """Error of the force on locked wheels, which should be mu N against the sliding velocity."""
     car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
     report, _ = _read(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())

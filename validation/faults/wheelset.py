@@ -37,19 +37,19 @@ HALF_DIFFERENCE_TIME = 1e-6
 
 
 def equations(law: Law = "fastsim") -> Equations:
-    """The chosen wheelset, with coarse cells."""
+    """Equations of the chosen wheelset, with few contact cells."""
     return Equations(CHOSEN, SPEED, law, 7)
 
 
 @cache
 def states() -> Array:
-    """States (2, 10) about rest."""
+    """Two states (2, 10) near rest."""
     return equations().rest + STATES
 
 
 @cache
 def by_engine() -> Array:
-    """Rates (2, 10) by MuJoCo."""
+    """Time derivatives (2, 10) of these states by MuJoCo."""
     built = MujocoWheelset(CHOSEN, SPEED, cells=7)
     return np.array([built.rates(state) for state in states()])
 
@@ -86,7 +86,7 @@ def _report(state: Array, law: Law = "fastsim") -> Array:
 
 
 def _friction() -> float:
-    """Creep forces of wheels that slide all over, divided by mu N, less 1; infinite if they have power."""
+    """Relative difference of the creep forces of fully sliding wheels from mu N; infinite if a contact gains energy."""
     report = _report(states()[SLIDING])
     if report["power"].max() > 0.0:
         return np.inf
@@ -95,7 +95,7 @@ def _friction() -> float:
 
 
 def _spin_and_load_at_rest() -> float:
-    """Spin and carried load at rest."""
+    """Errors of the spin and the carried load at rest."""
     rest = equations().rest
     report = _report(rest)
     up = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
@@ -103,7 +103,7 @@ def _spin_and_load_at_rest() -> float:
 
 
 def _linear() -> float:
-    """Creep forces and moment of the linear law against Kalker's theory at the creepages that are reported."""
+    """Error of the linear law's creep forces and moment against Kalker's theory at the reported creepages."""
     report = _report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
@@ -129,7 +129,7 @@ CHECKS = {
 
 
 def written(**functions: Any) -> Patch:
-    """The equations as plain Python, the forces of both rails patch by patch with functions replaced."""
+    """Patch that runs the equations as plain Python, contact by contact, with some functions replaced."""
 
     def prepare() -> Context:
         @contextmanager
@@ -146,7 +146,7 @@ def written(**functions: Any) -> Patch:
 
 
 def after(change: Callable[..., None]) -> Patch:
-    """The rates changed after they were found: change(state, body, rates)."""
+    """Patch that changes the time derivatives after their computation by change(state, body, rates)."""
 
     def with_change(original: Any) -> Any:
         def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
@@ -159,7 +159,8 @@ def after(change: Callable[..., None]) -> Patch:
 
 
 def creeping(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
-    """The creep law with contacts and slip changed, or another speed, before."""
+    """Patch of the creep law: contacts and slip are changed by change(contacts, slip) before it, or the speed is
+    multiplied by a factor."""
 
     def creep(contacts: Any, slip: Any, velocity: float, *rest: Any) -> None:
         contacts, slip = contacts.copy(), slip.copy()
@@ -170,7 +171,7 @@ def creeping(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
 
 
 def touching(change: Callable[[Any], None]) -> Patch:
-    """Places of contact changed."""
+    """Patch that changes the contact points."""
 
     def contact_points(pose: Any, rails: Any, touches: Any) -> None:
         wf.contact_points(pose, rails, touches)
@@ -180,7 +181,7 @@ def touching(change: Callable[[Any], None]) -> Patch:
 
 
 def times(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
-    """Multiply a field of one of the arrays."""
+    """Function that multiplies a field of one of its arrays by a factor."""
 
     def change(*arrays: Any) -> None:
         arrays[field_index][name] *= factor
@@ -196,13 +197,13 @@ def _shared(contacts: Any, slip: Any) -> None:
 
 
 def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
-    """The creep law with the moment of spin the other way."""
+    """Fault: the creep law gives the spin moment the opposite sign."""
     wf.creep(contacts, slip, *rest)
     rest[-1].forces["mz"] *= -1.0
 
 
 def _swapped(touches: Any) -> None:
-    """Each wheel on its own side with the other one's contact."""
+    """Fault: each wheel has the contact of the other wheel."""
     sides = {name: touches[name].copy() for name in ("y", "n_y")}
     touches[:] = touches[::-1].copy()
     for name, values in sides.items():

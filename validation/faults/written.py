@@ -29,14 +29,15 @@ BOUND = 1e-12
 
 
 def _on_tyres(name: str = "twin") -> float:
-    """Accelerations of a car, steered and braked on a rough slope, in MuJoCo and by the plain equations."""
+    """Relative difference between the accelerations of a steered and braked car on a rough slope by MuJoCo and by the
+    plain equations."""
     car = rolling_cars()[name]
     ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
     return largest_relative_difference(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
 
 
 def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
-    """Accelerations of the cut twin in MuJoCo and by the plain equations."""
+    """Relative difference between the accelerations of the twin on hub forces by MuJoCo and by the plain equations."""
     vehicle = cut_cars()["twin"]
     hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
     return largest_relative_difference(
@@ -59,7 +60,7 @@ CHECKS = {
 
 
 def _preload(module: str) -> Patch:
-    """One spring bears 1 % more at rest."""
+    """Fault: the preload of one spring is 1 % too large."""
 
     def changed(original: Any) -> Any:
         def made(vehicle: SpatialVehicle) -> Preloads:
@@ -73,7 +74,7 @@ def _preload(module: str) -> Patch:
 
 
 def _waves(original: Any) -> Any:
-    """The first wave of the road is 1 % higher in the table."""
+    """Fault: the first wave of the road has a 1 % larger amplitude in the table."""
 
     def made(car: Any) -> np.ndarray:
         numbers: np.ndarray = original(car)
@@ -85,7 +86,7 @@ def _waves(original: Any) -> Any:
 
 
 def _sample(original: Any) -> Any:
-    """A road is read 0.1 mm higher under the first hub."""
+    """Fault: the road under the first hub is read 0.1 mm too high."""
 
     def made(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
         hubs = hub_inputs.hubs.copy()
@@ -96,7 +97,7 @@ def _sample(original: Any) -> Any:
 
 
 def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[Any], Any]:
-    """A column of the table's tyres or parts, which tells what is towed, is 0 of all of them."""
+    """Fault: for all tyres or parts, the table's column that marks what belongs to a trailer is 0."""
 
     def changed(original: Any) -> Any:
         def made(car: Any) -> np.ndarray:
@@ -112,7 +113,7 @@ def _of_towed(section: int, count: int, per_row: int, column: int) -> Callable[[
 
 
 def _stiff_bars(original: Any) -> Any:
-    """Bars of a car on tyres are 1 % stiffer."""
+    """Fault: anti-roll bars of a car on tyres are 1 % too stiff."""
 
     def made(*arguments: Any) -> Iterator[Any]:
         for row, curves in original(*arguments):
@@ -122,7 +123,7 @@ def _stiff_bars(original: Any) -> Any:
 
 
 def _swapped(first: int, second: int) -> Callable[[Any], Any]:
-    """Two numbers of a row of the table change places."""
+    """Fault: two numbers in a row of the table are exchanged."""
 
     def changed(original: Any) -> Any:
         def made(*arguments: Any) -> list[float]:
@@ -136,7 +137,7 @@ def _swapped(first: int, second: int) -> Callable[[Any], Any]:
 
 
 def _turned_bar(original: Any) -> Any:
-    """The bars of a cut car work the other way round: their axes are as long as the track's inverse."""
+    """Fault: anti-roll bars of a cut car act in the opposite direction."""
 
     def made(element: Any, joined: Any) -> list[float]:
         row: list[float] = original(element, joined)
@@ -148,7 +149,7 @@ def _turned_bar(original: Any) -> Any:
 
 
 def _other_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
-    """The heaviest body has another inertia in the engine."""
+    """Fault: the heaviest body has another inertia in the engine."""
 
     def changed(original: Any) -> Any:
         def made(vehicle: SpatialVehicle, *others: Any) -> Any:

@@ -15,7 +15,7 @@ FAMILIES = tuple(module.name for module in iter_modules(__path__) if module.name
 
 
 def cases_by_family() -> tuple[tuple[str, Case], ...]:
-    """(family, case) of every case, in the order of the table."""
+    """All hard cases as pairs (family, case), in the order of the table."""
     return tuple(
         (family, case) for family in FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES
     )

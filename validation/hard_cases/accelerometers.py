@@ -35,7 +35,7 @@ def _read(
     noise: float = 0.0,
     initial: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Readings (n, sensors, 3), states (n, 8) and pitch accelerations (n,) of 0.3 s.
+    """Readings (n, sensors, 3), states (n, 8) and pitch accelerations (n,) of a run of 0.3 s.
 
     After a kick on a flat road, or in free fall from an initial state.
     """
@@ -55,12 +55,12 @@ def _read(
 
 
 def _turning(states: np.ndarray) -> np.ndarray:
-    """Local rates (n, 3) of a vehicle that pitches alone."""
+    """Angular velocities (n, 3) in body axes of a vehicle that only pitches."""
     return states[:, 7:] * [0.0, 1.0, 0.0]
 
 
 def _plain(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
-    """Pitch acceleration by eq. (18) as printed, with numpy's pseudo-inverse and nothing checked."""
+    """Pitch acceleration by eq. (18) as printed, by numpy's pseudo-inverse without any checks."""
     positions = np.array(list(places.values()))
     relative = np.swapaxes(specific_forces - specific_forces[:, -1:], 1, 2)[:, :, :-1]
     m = relative @ np.linalg.pinv((positions[:-1] - positions[-1]).T)
@@ -68,7 +68,7 @@ def _plain(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
 
 
 def plane(engine: str, folder: Path) -> float:
-    """Sensors on a flat floor; the pitch axis lies in their plane."""
+    """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane."""
     felt, states, true = _read(engine, FLOOR)
     computed = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
     return largest_magnitude(computed - true) / largest_magnitude(true)
@@ -82,7 +82,8 @@ def plane_naive(folder: Path) -> str:
 
 
 def nearly_plane(engine: str, folder: Path) -> float:
-    """The fifth sensor 3 cm above the others, and noise: of what the noise of the readings must leave."""
+    """Case: noisy sensors, the fifth only 3 cm above the plane of the others. Error: rms error of the pitch
+    acceleration, divided by the least that this noise can cause."""
     felt, states, true = _read(engine, LIFTED, noise=NOISE)
     array = sensor_array(LIFTED)
     computed = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
@@ -98,7 +99,7 @@ def nearly_plane_naive(folder: Path) -> str:
 
 
 def bracket(engine: str, folder: Path) -> float:
-    """Five rigid sensors and one on a bracket; the one that does not belong is left out."""
+    """Case: five rigid sensors and one on a flexible bracket, which must be left out."""
     felt, states, true = _read(engine, ROOFED, BRACKET)
     places = ROOFED | {"battery": (0.6, 0.3, 0.0)}
     loose = quality(sensor_array(places), felt).suspect
@@ -109,21 +110,21 @@ def bracket(engine: str, folder: Path) -> float:
 
 
 def bracket_naive(folder: Path) -> str:
-    """The printed formula on all six."""
+    """Without the guard: the printed formula with all six sensors."""
     felt, _, true = _read("reference", ROOFED, BRACKET)
     wrong = largest_magnitude(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / largest_magnitude(true)
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
 def gap(engine: str, folder: Path) -> float:
-    """One reading is not a number."""
+    """Case: one reading is NaN. Error: largest error of the rates."""
     felt, states, _ = _read(engine, ROOFED)
     felt[100, 2, 0] = np.nan
     return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
 
 
 def gap_naive(folder: Path) -> str:
-    """The printed formula, summed up."""
+    """Without the guard: how much of a sum over the printed formula's values is lost by one NaN."""
     felt, _, _ = _read("reference", ROOFED)
     felt[100, 2, 0] = np.nan
     lost = np.isnan(np.cumsum(_plain(ROOFED, felt))).mean()
@@ -131,7 +132,7 @@ def gap_naive(folder: Path) -> str:
 
 
 def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, Start]:
-    """A vehicle in free fall that turns, its struts unstressed: readings, states and the start."""
+    """A rotating vehicle in free fall with unstressed struts: readings, states and initial state."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
     felt, states, _ = _read(engine, ROOFED, initial=start)
@@ -139,7 +140,7 @@ def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.nda
 
 
 def tumbling(engine: str, folder: Path) -> float:
-    """The nose passes through the vertical: the orientation as a matrix."""
+    """Case: the nose passes through the vertical, which an orientation by matrices must stand."""
     felt, states, start = _falling(engine, 1.4, 3.0)
     orientation = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
     none = np.zeros(len(states))
@@ -147,13 +148,14 @@ def tumbling(engine: str, folder: Path) -> float:
 
 
 def locked(engine: str, folder: Path) -> float:
-    """The nose points straight up, and someone asks for roll and yaw."""
+    """Case: the nose points straight up, where roll and yaw are not unique. Error: largest roll or yaw that is
+    given."""
     felt, _, start = _falling(engine, np.pi / 2, 0.0)
     return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
 
 
 def locked_naive(folder: Path) -> str:
-    """The textbook's formulas at the same attitude."""
+    """Without the guard: roll by the textbook's formula at this attitude."""
     s = matrix(from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])
     return f"the textbook's formula gives a roll of {roll:.2f} rad for 0.30, out of rounding errors"

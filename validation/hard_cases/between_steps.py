@@ -33,7 +33,8 @@ HANDLED: dict[str, Word] = {"reference": "refused"}
 
 
 def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callable[[str, Path], float]:
-    """A case of a wheelset that is let go 5 mm beside the middle, for a fifth of a second in the usual steps."""
+    """Case: a wheelset is released 5 mm off centre and runs for 0.2 s. Error: difference of its final lateral position
+    and yaw (m, rad) from those with a quarter of the step."""
 
     def error(implementation: str, folder: Path) -> float:
         wheelset = built_wheelset(implementation, CHOSEN.changed(**changed), speed)
@@ -46,13 +47,14 @@ def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callabl
 
 
 def car(step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
-    """A car of 19 freedoms in a manoeuvre of a fifth of a second, in steps of a millisecond where no other is named."""
+    """Scene of a car with 19 freedoms in a manoeuvre of 0.2 s, in steps of 1 ms by default."""
     driven = {"hard": {"speed": 20.0, "duration": 0.2} | manoeuvre}
     return build({"title": "hard", "system": "handling", "run": {"step": step}, "manoeuvres": driven})
 
 
 def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
-    """A case of a car: difference of its places (m, rad) from those by a quarter of the step."""
+    """Case: a car in a manoeuvre. Error: difference of its final coordinates (m, rad) from those with a quarter of the
+    step."""
 
     def error(implementation: str, folder: Path) -> float:
         if implementation == "reference":
@@ -64,7 +66,7 @@ def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
 
 
 def refused_case(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
-    """A case that is to be refused; an answer is wrong."""
+    """Case that must be refused; any answer is wrong."""
 
     def error(implementation: str, folder: Path) -> float:
         answer()
@@ -74,7 +76,7 @@ def refused_case(answer: Callable[[], Any]) -> Callable[[str, Path], float]:
 
 
 def hubs_over_waves(implementation: str, folder: Path) -> float:
-    """Hub forces of a road at 60 m/s in steps of 20 ms: every step passes three waves."""
+    """Case: hub forces of a road at 60 m/s in steps of 20 ms, each of which passes three waves."""
     table = {
         "title": "hard",
         "system": "hub-forces",
@@ -88,8 +90,8 @@ def hubs_over_waves(implementation: str, folder: Path) -> float:
 
 
 def driven_over_waves(implementation: str, folder: Path) -> float:
-    """A car on a rough road at 1000 m/s in steps of 1 ms: the error beside a tenth of the step by the one told, of the
-    worst channel; infinite unless that is a warning."""
+    """Case: a car on a rough road at 1000 m/s in steps of 1 ms. Error: ratio of the true error (against a tenth of the
+    step) to the stated one in the worst channel; infinite unless the stated error is a warning."""
     if implementation == "reference":
         raise InputError("", "engine", implementation, "handling is marched by engines")
     told = run(car(speed=1000.0, rough=True), implementation, error=True)
@@ -100,26 +102,27 @@ def driven_over_waves(implementation: str, folder: Path) -> float:
 
 
 def crossings(implementation: str, folder: Path) -> float:
-    """Counts of levels in any order against those counted one by one."""
+    """Case: level crossings counted for levels in any order. Error: difference from counting level by level."""
     load, levels = np.array([0.0, 3.0, 1.0, 5.0, 0.0, 2.0, 1.0, 4.0]), np.array([2.5, 0.5, 3.5, 1.5])
     rises = [sum(a < level <= b for a, b in pairwise(load)) for level in levels]
     return float(np.abs(level_crossings(load, levels) - rises).max())
 
 
 def far_seeds(implementation: str, folder: Path) -> float:
-    """Number of seeds around 2^63 and at the end of the range whose stream another seed has, too."""
+    """Number of noise seeds near 2^63 and at the end of the range that give the same stream as another seed."""
     seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
     return float(len(seeds) - len({float(normal(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
 
 
 def line_through_a_low_pass(implementation: str, folder: Path) -> float:
-    """A straight line of 2 s through the slowest low-pass that it may have: change by its rise."""
+    """Case: a straight line of 2 s through the slowest low-pass that is allowed. Error: largest change, relative to the
+    line's rise."""
     line = np.linspace(0.0, 1.0, 2001)[:, None]
     return float(np.abs(smoothed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
 
 
 def slow_naive(folder: Path) -> str:
-    """The filter by itself with a fiftieth of a period in the record."""
+    """Without the guard: the filter alone, with a fiftieth of its period in the record."""
     from scipy.signal import butter, sosfiltfilt
 
     line = np.linspace(0.0, 1.0, 2001)

@@ -11,7 +11,8 @@ LOOPED = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.
 
 
 def ways(implementation: str, folder: Path) -> float:
-    """A way of random turns walked in 1, 7 and 50 parts between its turns: largest difference at the turns, N m."""
+    """Case: a random pressure path, traversed in 1, 7 and 50 steps between its turning points. Error: largest
+    difference of the torque (N m) at these."""
     turns = np.concatenate(([0.0], np.random.default_rng(2).uniform(0.0, 6.0, 60)))
     levels = []
     for parts in (1, 7, 50):
@@ -21,7 +22,8 @@ def ways(implementation: str, folder: Path) -> float:
 
 
 def loops(implementation: str, folder: Path) -> float:
-    """Loops between random pressures: the most negative area or torque, N m bar; 1000 steps each way."""
+    """Case: hysteresis loops between random pressures, in 1000 steps each way. Error: magnitude of the most negative
+    area (N m bar) or torque (N m)."""
     worst = 0.0
     for low, high in np.sort(np.random.default_rng(3).uniform(0.0, 6.0, (20, 2)), axis=1):
         once = np.concatenate((np.linspace(low, high, 1001), np.linspace(high, low, 1001)))

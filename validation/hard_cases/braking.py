@@ -22,7 +22,7 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 
 def refused(run: Callable[[], Any]) -> wheels.Error:
-    """A case that is refused."""
+    """Case that must be refused."""
 
     def error(implementation: str, folder: Path) -> float:
         run()
@@ -32,7 +32,7 @@ def refused(run: Callable[[], Any]) -> wheels.Error:
 
 
 def slippery_brake() -> None:
-    """A brake that lets go above the pressure at which it takes hold."""
+    """Make a brake whose release pressure is above its push-out pressure; raises InputError."""
     try:
         Brake(push_out=0.5, release=0.7, rising=1000.0, falling=1000.0)
     except ValueError as error:
@@ -40,12 +40,12 @@ def slippery_brake() -> None:
 
 
 def stops(name: str, hard: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
-    """A case of a wheel at a slip that stays."""
+    """Case of a wheel that is held at constant slip."""
     return Case(name, hard, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
 
 
 def fails(name: str, hard: str, error: wheels.Error) -> Case:
-    """A case in which every implementation has to raise."""
+    """Case in which every implementation must raise an error."""
     return Case(name, hard, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised"))
 
 

@@ -41,22 +41,23 @@ class Case:
     once: bool = False
 
     def wanted(self, implementation: str) -> Word:
-        """The outcome that this case must have in one implementation."""
+        """The outcome that an implementation must have in this case."""
         return self.expected.get(implementation, "right")
 
     def judged(self) -> tuple[str, ...]:
-        """The implementations in which the case is judged."""
+        """The implementations in which this case is judged."""
         return IMPLEMENTATIONS[:1] if self.once else IMPLEMENTATIONS
 
     def independence(self, implementation: str) -> Independence:
-        """The tight solution has the equations of the reference: to it alone they are shared."""
+        """How independent the expected answer is of an implementation. The tight solution uses the reference's
+        equations, so it is shared for the reference only."""
         return "shared kernel" if self.against == "native" and implementation == "reference" else self.against
 
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """Outcome of a hard case. word : how it ended; error : in the case's unit, None where there is no answer; message :
-    what was said."""
+    """Outcome of a hard case. word : how it ended; error : in the case's unit, None if there is no answer; message :
+    text of the exception."""
 
     word: Word
     error: float | None = None
@@ -64,7 +65,8 @@ class CaseOutcome:
 
 
 def judge(case: Case, implementation: str, folder: Path) -> CaseOutcome:
-    """Outcome of a case in one implementation; any error but the project's own passes through."""
+    """Outcome of a case in one implementation; only the project's own exceptions count as outcomes, all others pass
+    through."""
     try:
         error = float(case.error(implementation, folder))
     except InputError as refusal:

@@ -14,11 +14,11 @@ COVERED = {
 
 
 def missing(names: set[str]) -> list[str]:
-    """Cases that the catalogue names and that are not there, with their number."""
+    """Cases that the catalogue names but that do not exist, with their catalogue number."""
     return [f"{number}: {name}" for number, (_, cases) in COVERED.items() for name in cases if name not in names]
 
 
 def beyond(names: list[str]) -> list[str]:
-    """Cases that no number of the catalogue names."""
+    """Cases that belong to no number of the catalogue."""
     named = {name for _, cases in COVERED.values() for name in cases}
     return [name for name in names if name not in named]

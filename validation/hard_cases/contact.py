@@ -19,20 +19,20 @@ A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 
 def no_creepage(implementation: str, folder: Path) -> float:
-    """Forces without creepage, and whether their derivatives are numbers."""
+    """Case: no creepage. Error: largest force; infinite if a derivative is not finite."""
     answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
 def no_creepage_naive(folder: Path) -> str:
-    """Error at no creepage with the weighted flexibility as it is printed."""
+    """Without the guard: the weighted flexibility of 1982 without creepage is 0/0."""
     with np.errstate(invalid="ignore"):
         weighted = np.float64(0.0) / np.float64(0.0)
     return f"the weighted flexibility of 1982 is 0/0 there: {weighted}"
 
 
 def next_to_none(implementation: str, folder: Path) -> float:
-    """Creepages of 1e-300 to 1e-12 against the linear theory."""
+    """Case: creepages from 1e-300 to 1e-12. Error: difference from the linear theory."""
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
     motion = (small, -0.5 * small, 30.0 * small)
     answer, linear = fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR), forces(A, B, *motion, PAIR)
@@ -41,7 +41,8 @@ def next_to_none(implementation: str, folder: Path) -> float:
 
 
 def against(implementation: str, folder: Path) -> float:
-    """Spin whose pole is anywhere in the ellipse: error of 21 cells divided by mu N, all bounded."""
+    """Case: spin whose pole lies anywhere in the ellipse. Error: largest difference of the force with 21 cells from
+    that with 201, divided by mu N."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
     coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=cells) for cells in (21, 201))
@@ -49,7 +50,7 @@ def against(implementation: str, folder: Path) -> float:
 
 
 def against_naive(folder: Path) -> str:
-    """The march of 1982 on the same cells."""
+    """Without the remedy: the march of 1982 on the same cells."""
     motion = (0.0, -0.25 * A, 0.5)
     plain, fine = (
         fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, march="plain"),
@@ -59,7 +60,8 @@ def against_naive(folder: Path) -> str:
 
 
 def lift_off(implementation: str, folder: Path) -> float:
-    """Force divided by mu N as the load goes to nothing and below: full sliding, then exactly none."""
+    """Case: loads from large to zero and negative in full sliding. Error: difference of the force from mu N, or from 0
+    without load, divided by the largest mu N."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
     contact = hertz.by_load(1.1, 0.8, load, PAIR)
     answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), PAIR)
@@ -67,14 +69,16 @@ def lift_off(implementation: str, folder: Path) -> float:
 
 
 def flipping(implementation: str, folder: Path) -> float:
-    """Largest deviation of a creep curve from a smooth one, divided by mu N, over 2001 creepages."""
+    """Case: a creep curve at 2001 creepages. Error: largest second difference divided by mu N, which is small for a
+    smooth curve."""
     creep = np.linspace(0.0, 4e-3, 2001)
     force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), PAIR).fx / (MU * LOAD)
     return float(np.abs(np.diff(force, 2)).max())
 
 
 def locked(implementation: str, folder: Path) -> float:
-    """A locked wheel, and spin of a thousand per metre: |F| beyond mu N."""
+    """Case: a locked wheel, and a spin of 1000 per metre. Error: amount by which the force exceeds mu N, relative to
+    it."""
     ellipses = RollingEllipse(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3)
     answer = fastsim(ellipses, PAIR)
     return float(np.max(np.hypot(answer.fx, answer.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))

@@ -27,23 +27,24 @@ def _linear_error(cells: int, march: March) -> float:
 
 
 def few_cells(implementation: str, folder: Path) -> float:
-    """Error of the force of a small creepage by 8, 16 and 32 cells, by 1.6 (8 / cells)^1.9 per cent."""
+    """Ratio of the error of the force at small creepage with 8, 16 and 32 cells to the bound 1.6 (8 / cells)^1.9 per
+    cent."""
     return max(_linear_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
 
 
 def few_cells_naive(folder: Path) -> str:
-    """Error on few cells with a whole first step at the leading edge."""
+    """Without the remedy: error on few cells if the first step at the leading edge is a complete one."""
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
 def _draw_creepages(count: int = 400) -> np.ndarray:
-    """Creepages and spin (3, count) from sticking to sliding."""
+    """Random creepages and spin (3, count), from sticking to full sliding."""
     draw = np.random.default_rng(8)
     return draw.uniform(-1.0, 1.0, (3, count)) * 10.0 ** draw.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
 
 
 def reversed_signs(implementation: str, folder: Path) -> float:
-    """All creepages turned round: forces that do not turn round exactly, divided by mu N."""
+    """Case: all creepages reversed. Error: largest deviation of the forces from the reversed ones, divided by mu N."""
     along, across, spin = _draw_creepages()
     ellipses = (RollingEllipse(A, B, LOAD, MU, s * along, s * across, s * spin) for s in (1.0, -1.0))
     first, second = (fastsim(ellipse, PAIR) for ellipse in ellipses)
@@ -51,14 +52,15 @@ def reversed_signs(implementation: str, folder: Path) -> float:
 
 
 def mirrored(implementation: str, folder: Path) -> float:
-    """Left and right exchanged: lateral creepage, spin and lateral force change their sign; divided by mu N."""
+    """Case: left and right exchanged, so that lateral creepage, spin and lateral force change sign. Error: largest
+    deviation divided by mu N."""
     along, across, spin = _draw_creepages()
     first, second = (fastsim(RollingEllipse(A, B, LOAD, MU, along, s * across, s * spin), PAIR) for s in (1.0, -1.0))
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def power_gained(implementation: str, folder: Path) -> float:
-    """Most power gained per metre, divided by mu N times the creepage, 21 cells."""
+    """Largest energy that a contact gains per metre, divided by mu N times the creepage, on 21 cells."""
     along, across, spin = _draw_creepages()
     size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
     lost = fastsim(RollingEllipse(A, B, LOAD, MU, along, across, spin), PAIR).dissipation
@@ -66,7 +68,8 @@ def power_gained(implementation: str, folder: Path) -> float:
 
 
 def only_spin(implementation: str, folder: Path) -> float:
-    """Errors under pure spin: force along the rail, and of small spin across it against the linear theory."""
+    """Case: pure spin. Error: the larger of the longitudinal force divided by mu N and, for small spin, the relative
+    error of the lateral force against the linear theory."""
     small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), PAIR)
     large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), PAIR)
     wanted = float(forces(A, B, 0.0, 0.0, 1e-6, PAIR)[1])
@@ -74,14 +77,15 @@ def only_spin(implementation: str, folder: Path) -> float:
 
 
 def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 101)) -> NormalSolution:
-    """Two balls side by side, their centres so far apart (m)."""
+    """Exact normal contact of two balls side by side at a distance (m) between their centres."""
     y, x = (centres(n, CELL) for n in cells)
     away = np.minimum((x - centre_distance / 2) ** 2, (x + centre_distance / 2) ** 2) + y[:, None] ** 2
     return solve_normal(away / (2.0 * RADIUS), CELL, CELL, PAIR, load=load)
 
 
 def two_patches(implementation: str, folder: Path) -> float:
-    """Two patches: halves that differ, or an area off that of a ball alone by more than the cells along its edge."""
+    """Case: two separate contact patches. Error: relative error of one patch's load, or difference of the area from
+    that of single balls beyond the cells along the edges."""
     draw = _balls(9e-3, 2.0 * SPHERE)
     left = float(draw.pressure[:, : draw.x.size // 2].sum() * CELL**2)
     alone = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, PAIR)
@@ -90,13 +94,14 @@ def two_patches(implementation: str, folder: Path) -> float:
 
 
 def merging(implementation: str, folder: Path) -> float:
-    """Balls that come nearer in steps of a fifth of a cell: largest jump of the approach, by itself."""
+    """Case: two balls approach each other in steps of a fifth of a cell. Error: largest second difference of the
+    approach, relative to it."""
     answer = [_balls(apart, 2.0 * SPHERE, (41, 81)).approach for apart in np.linspace(4.0e-3, 3.4e-3, 21)]
     return float(np.abs(np.diff(answer, 2)).max() / answer[0])
 
 
 def at_the_edge(implementation: str, folder: Path) -> float:
-    """A patch that the grid cuts off."""
+    """Case: a contact patch that the grid's edge cuts off."""
     return _balls(9e-3, 2.0 * SPHERE, (41, 61)).load
 
 

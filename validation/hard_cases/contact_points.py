@@ -17,13 +17,13 @@ LOAD = 1000.0
 
 
 def _compressions(assembly: Assembly, path: Trajectory) -> np.ndarray:
-    """Tyre compression (n, 2) in m along a run."""
+    """Tyre compression (n, 2) in m along a run's path."""
     channels = contact_points(assembly, path.times, path.states)
     return path.states[:, :2] - np.column_stack([channels["zeta1"][2], channels["zeta2"][2]])
 
 
 def step_answer(engine: str, folder: Path) -> float:
-    """A force from 0 to 1 kN, steps from a tenth to twenty times the time constant."""
+    """Case: a force step from 0 to 1 kN, with time steps from a tenth to twenty times the tyre's time constant."""
     base = vehicle()
     values = np.zeros((10, 2))
     values[1:] = LOAD
@@ -41,7 +41,7 @@ def step_answer(engine: str, folder: Path) -> float:
 
 
 def step_answer_naive(folder: Path) -> str:
-    """The answer to a step by a native MuJoCo activation with MuJoCo's usual filter."""
+    """Without the remedy: response to a step by MuJoCo's own activation with its usual filter."""
     ends = []
     for integrator in ("Euler", "RK4"):
         model = mujoco.MjModel.from_xml_string(
@@ -57,12 +57,12 @@ def step_answer_naive(folder: Path) -> str:
 
 
 def linear_load(engine: str, folder: Path) -> float:
-    """A load ramp of 1 kN in 20 ms, whose compression must lag by exactly the closed form."""
+    """Case: a load ramp of 1 kN in 20 ms. Error: difference from the closed form, in which the compression lags."""
     return max(_ramp_error(engine, step, IMPLICIT[engine]) for step in (1e-3, 5e-3, 2e-2))
 
 
 def _ramp_error(engine: str, step: float, integrator: str) -> float:
-    """Largest difference to the ramp's closed form at each row's own time, of f/k."""
+    """Largest difference of the compression from the ramp's closed form at the time of each row, divided by f/k."""
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
     assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
     path = run(engine, assembly, step, 0.1, integrator)
@@ -70,7 +70,7 @@ def _ramp_error(engine: str, step: float, integrator: str) -> float:
 
 
 def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
-    """Compression (n,) under a load that rises to LOAD in 20 ms: two ramps, one of them late."""
+    """Compression (n,) in m under a load that rises to LOAD in 20 ms, as the difference of two ramps."""
     lag = damping / stiffness
 
     def ramp(t: np.ndarray) -> np.ndarray:
@@ -80,12 +80,13 @@ def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
 
 
 def stamps(engine: str, folder: Path) -> float:
-    """Error of the sampled ramp along an adaptive run, whose rows lie anywhere."""
+    """Case: the ramp in an adaptive run with rows at any times. Error: difference from the closed form at these
+    times."""
     return _ramp_error(engine, 1e-3, {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4"))
 
 
 def undamped(engine: str, folder: Path) -> float:
-    """A tyre without damping: the contact point has no state and follows its force at once."""
+    """Case: a tyre without damping, whose contact point has no state and follows its force at once."""
     base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
     assembly = driven_by_forces(base, Sampled(values, 1e-3, held=True))

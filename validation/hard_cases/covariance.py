@@ -17,14 +17,15 @@ PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 
 
 def _base(values: np.ndarray) -> Assembly:
-    """The linearised vehicle under its weight and these errors of its forces (n, 2) in N."""
+    """The linearised vehicle under its weight, with these errors (n, 2) in N added to its force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, PERIOD)
     return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
 
 
 def held_noise(engine: str, folder: Path) -> float:
-    """Every sample of 1 N alone through the engine, squared and summed, against the recursion; relative."""
+    """Case: an error of 1 N in each single sample is run through the engine. Error: relative difference of the summed
+    squares of the responses from the covariance recursion."""
     quiet = setups.run(engine, _base(np.zeros((SAMPLES, 2))), STEP, PERIOD * SAMPLES).states[-1]
     responses = []
     for sample in range(SAMPLES):
@@ -43,7 +44,7 @@ def _recursion() -> np.ndarray:
 
 
 def van_loan_naive(folder: Path) -> str:
-    """Process noise over one and over twenty periods by filterpy's van Loan discretisation."""
+    """Without the remedy: process noise over one and over twenty periods by filterpy's van Loan discretisation."""
     from filterpy.common import van_loan_discretization
 
     from models.engines.stability import first_order, linearised

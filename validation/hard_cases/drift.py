@@ -31,38 +31,38 @@ HEAVY_NOISE = 300.0
 
 @cache
 def measured(grade: float = 0.0) -> Result:
-    """The study road, on a grade (rad) where one is asked for."""
+    """Virtual measurement on the study road, or on the road with a grade (rad)."""
     road = STUDY_ROAD | ({"grade": grade} if grade else {})
     return simulate(road_scene(duration=DURATION, road=road), "reference")
 
 
 def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0) -> Scene:
-    """The vehicle under the forces of that run, started with a wrong pitch rate (rad/s)."""
+    """Scene driven by the forces of the true run, with a wrong initial pitch rate (rad/s)."""
     write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=DURATION, effects=effects)
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
 def figures(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
-    """Figures of a run without the truth, and its errors against the truth."""
+    """Figures of a run that need no true run, and its errors relative to the true run."""
     return figures_of_run(run, scene.vehicle_parameters()), errors(run, truth)
 
 
 def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
-    """The words of the verdicts with and without the true run."""
+    """Words of the verdicts on a run, with and without knowledge of the true run."""
     scores, wrong = figures(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
     return verdict(scores, wrong, scene.effects, Limits()).word, known.word
 
 
 def tumbled(engine: str, folder: Path) -> float:
-    """A free run that has turned over."""
+    """Case: a free run that has turned over must be rejected."""
     judged = verdict_words(engine, follow(folder, measured(), tilt=TILT), measured())
     return float(judged != ("rejected", "rejected"))
 
 
 def tumbled_naive(folder: Path) -> str:
-    """Damage of a tumbled run by its vertical forces alone."""
+    """Without the guard: damage of a tumbled run from its vertical forces alone."""
     scene = follow(folder, measured(), tilt=TILT)
     scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
@@ -76,12 +76,12 @@ FIRM = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
 def soft_spring(engine: str, folder: Path) -> float:
-    """A spring that is too soft."""
+    """Case: a holding spring that is too soft."""
     return float(verdict_words(engine, follow(folder, measured(), SPRING, TILT), measured())[0] != "rejected")
 
 
 def soft_naive(folder: Path) -> str:
-    """Figures of the run itself, which do not show that its stabiliser is soft."""
+    """Without the guard: figures of the run itself, which do not show that the spring is too soft."""
     scene = follow(folder, measured(), SPRING, TILT)
     scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
@@ -91,7 +91,8 @@ def soft_naive(folder: Path) -> str:
 
 
 def graded(engine: str, folder: Path) -> float:
-    """A spring on a grade: wrong, and never called right without the truth."""
+    """Case: a holding spring on a grade, which gives wrong results. Error: 0 if it is rejected, and not accepted
+    without the true run either; else 1."""
     judged = verdict_words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
     return float(judged != ("rejected", "stabilise"))
 
@@ -112,14 +113,14 @@ def _random_walk() -> np.ndarray:
 
 
 def broken_load(engine: str, folder: Path) -> float:
-    """One sample that is not a number."""
+    """Case: a load with one sample that is NaN."""
     load = _random_walk().copy()
     load[250] = np.nan
     return pseudo_damage(load)
 
 
 def broken_load_naive(folder: Path) -> str:
-    """Damage of a load with a value that is no number, by the rainflow library."""
+    """Without the guard: damage of a load with a NaN by the rainflow library."""
     from rainflow import extract_cycles
 
     load = _random_walk().copy()
@@ -129,45 +130,46 @@ def broken_load_naive(folder: Path) -> str:
 
 
 def empty_load(engine: str, folder: Path) -> float:
-    """A load without a sample."""
+    """Case: a load without samples."""
     return pseudo_damage(np.empty(0))
 
 
 def constant_truth(engine: str, folder: Path) -> float:
-    """A true load that never varies: nothing can be compared to its damage."""
+    """Case: a true load that is constant and has no damage to compare with."""
     return damage_ratio(_random_walk(), np.full(500, 3.0))
 
 
 def huge_load(engine: str, folder: Path) -> float:
-    """Ratio of damages that are both beyond all numbers."""
+    """Case: a ratio of two damages that both exceed the range of floating point."""
     load = np.array([0.0, 1e200, 0.0])
     return damage_ratio(load, load)
 
 
 def no_slope(engine: str, folder: Path) -> float:
-    """Damage at a Woehler exponent that is no number: a power of 1 hides it."""
+    """Case: the damage exponent (Woehler slope) is NaN, which a power of 1 would hide."""
     return pseudo_damage(np.array([0.0, 1.0, 0.0]), np.nan)
 
 
 def no_intensity(engine: str, folder: Path) -> float:
-    """Time to drift off under noise of negative intensity."""
+    """Case: drift-off time under noise of negative intensity."""
     return drift_off_time(1.0, -1.0, 0.05)
 
 
 def two_points(engine: str, folder: Path) -> float:
-    """A load of one rise."""
+    """Case: a load with two samples, which is a single rise."""
     return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
 
 
 def two_points_naive(folder: Path) -> str:
-    """Damage of a load of two points, by the rainflow library."""
+    """Without the guard: damage of a load with two samples by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"
 
 
 def before_drift(engine: str, folder: Path) -> float:
-    """Difference to another implementation under the same noise, up to the drift-off, of the largest state."""
+    """Case: noisy run compared with another implementation until drift-off. Error: largest difference relative to the
+    largest state."""
     scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY_NOISE}})
     other = "mujoco" if engine == "reference" else "reference"
     first, two = (simulate(scene, name) for name in (engine, other))
@@ -176,13 +178,14 @@ def before_drift(engine: str, folder: Path) -> float:
 
 
 def _first_row_off(run: Result, truth: Result) -> int | None:
-    """First row at which the run is DRIFTED_PITCH from the measured pitch; None where it never is."""
+    """First row at which the run's pitch differs from the measured pitch by more than DRIFTED_PITCH; None if it never
+    does."""
     far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > DRIFTED_PITCH)
     return int(far[0]) if len(far) else None
 
 
 def before_drift_naive(folder: Path) -> str:
-    """Two step sizes of the reference, compared over 30 s."""
+    """Without the guard: two step sizes of the reference compared over 30 s, beyond drift-off."""
     truth = simulate(road_scene(duration=30.0), "reference")
     write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})

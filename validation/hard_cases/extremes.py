@@ -22,13 +22,13 @@ def _raised_vehicle(base: Assembly) -> Assembly:
 
 
 def _distance_from_equilibrium(engine: str, base: Assembly, integrator: str = "") -> float:
-    """Distance from the equilibrium after 3 s, relative to the start's."""
+    """Distance from the equilibrium after 3 s, relative to the initial distance."""
     end = run(engine, _raised_vehicle(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
     return largest_magnitude(end - base.initial) / 0.01
 
 
 def undamped(engine: str, folder: Path) -> float:
-    """No damper at all, 1 s, against the matrix exponential."""
+    """Case: a vehicle without any dampers for 1 s. Error: difference from the matrix exponential."""
     return _ringing(engine)
 
 
@@ -40,13 +40,13 @@ def _ringing(engine: str, integrator: str = "") -> float:
 
 
 def _undamped() -> tuple[Assembly, np.ndarray]:
-    """The vehicle without dampers, off its equilibrium, and its states over 1 s."""
+    """The vehicle without dampers, displaced from equilibrium, and its exact states over 1 s."""
     base = _raised_vehicle(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
     return base, exact_states(base, 1e-3, 1000)
 
 
 def undamped_unchecked_euler(folder: Path) -> str:
-    """Explicit Euler past the check: every mode grows."""
+    """Without the guard: explicit Euler with the check bypassed, by which every mode grows."""
     base, truth = _undamped()
     states = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
@@ -56,12 +56,12 @@ def undamped_unchecked_euler(folder: Path) -> str:
 
 
 def undamped_euler(engine: str, folder: Path) -> float:
-    """Growth of the undamped oscillation by a first-order explicit method."""
+    """Case: undamped oscillation by an explicit first-order method, which makes it grow."""
     return _ringing(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
 def light_wheel(engine: str, folder: Path) -> float:
-    """Wheels of 0.75 g under 750 kg at the recommended setting: poles of -1.4e7 1/s."""
+    """Case: wheels of 0.75 g under 750 kg, with poles of -1.4e7 1/s, at the recommended setting."""
     return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
 
 
@@ -71,7 +71,7 @@ def light_wheel_implicit(engine: str, folder: Path) -> float:
 
 
 def stiff_tyre(engine: str, folder: Path) -> float:
-    """Tyres of 1e9 N/m at the recommended setting: wheels at 8,200 rad/s."""
+    """Case: tyres of 1e9 N/m, so that the wheels oscillate at 8,200 rad/s, at the recommended setting."""
     return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9))
 
 
@@ -81,7 +81,7 @@ def stiff_tyre_implicit(engine: str, folder: Path) -> float:
 
 
 def stiff_tyre_naive(folder: Path) -> str:
-    """Two steps past the check."""
+    """Without the guard: two steps with the check bypassed."""
     base = vehicle(k1=1e9, k2=1e9)
     end = unchecked("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
     return f"MuJoCo past the check: {largest_magnitude(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"

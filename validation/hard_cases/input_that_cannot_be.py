@@ -55,14 +55,14 @@ QUERIED: dict[str, dict[str, float]] = {
 
 @cache
 def true_forces() -> np.ndarray:
-    """Wheel forces (n, 2) of the asymmetric vehicle on hills, N."""
+    """Wheel forces (n, 2) in N of the asymmetric vehicle on hills."""
     road = {"source": "hills", "speed": 20.0}
     run = simulate(road_scene("asymmetric_twin", PERIOD, DURATION, road), "reference")
     return np.column_stack([run["f1"], run["f2"]])
 
 
 def error_texts(change: Change) -> list[str]:
-    """Errors and doubts about the forces, changed; InputError where there is an error."""
+    """Texts of errors and doubts that are found in changed forces; raises InputError if there is an error."""
     front, rear = (
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )

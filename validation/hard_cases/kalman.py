@@ -28,7 +28,8 @@ SLOW_PERIOD = 0.1
 
 
 def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
-    """Largest pitch error by its stated deviation of a vehicle at rest, its pitch unknown in the ``lost`` samples.
+    """Ratio of the largest pitch error to its stated deviation for a vehicle at rest, with the pitch missing in the
+    ``lost`` samples.
 
     The filter starts from a pitch that is ``turn`` (rad) wrong.
     """
@@ -62,12 +63,12 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
 
 
 def outage(engine: str, folder: Path) -> float:
-    """Three and a half seconds without a number."""
+    """Case: no pitch measurement for 3.5 s."""
     return _largest_pitch_error(engine, folder, slice(200, 900))
 
 
 def outage_naive(folder: Path) -> str:
-    """The filter's own update with a value that is not a number."""
+    """Without the guard: the filter library's own update with a NaN."""
     kalman = ExtendedKalmanFilter(2, 1)
     kalman.x = np.zeros(2)
     kalman.update(np.array([np.nan]), lambda x: np.eye(2)[:1], lambda x: x[:1])
@@ -75,13 +76,13 @@ def outage_naive(folder: Path) -> str:
 
 
 def wrong_start(engine: str, folder: Path) -> float:
-    """A start that is wrong by one stated deviation."""
+    """Case: the initial pitch is wrong by one stated deviation."""
     return _largest_pitch_error(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
 
 
 def certain_start(engine: str, folder: Path) -> float:
-    """Angles are measured to 1e-9 rad after a start known to 1 rad: the pitch error divided by its stated deviation; no
-    negative covariance."""
+    """Case: angles measured to 1e-9 rad after an initial uncertainty of 1 rad. Error: ratio of the pitch error to its
+    stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
     base = vehicle()
     forces = static_forces(base, count + 1, PERIOD, held=False)
@@ -104,12 +105,13 @@ def certain_start(engine: str, folder: Path) -> float:
 
 
 def empty_column(engine: str, folder: Path) -> float:
-    """A column without a single number."""
+    """Case: a column of measurements without any number."""
     return _largest_pitch_error(engine, folder, slice(None))
 
 
 def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW_PERIOD."""
+    """Matrices A (6, 6) and B (6, 2) of the relative states, and their exact response (6, 2) to forces held over
+    SLOW_PERIOD."""
     a, b = relative(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
@@ -117,7 +119,7 @@ def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def stiff_process_noise(engine: str, folder: Path) -> float:
-    """Process noise of a filter whose forces are sampled at 10 Hz, for a vehicle with a pole at -697 1/s."""
+    """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s."""
     base = vehicle(geometry="linear")
     forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
     step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)
@@ -127,7 +129,7 @@ def stiff_process_noise(engine: str, folder: Path) -> float:
 
 
 def stiff_naive(folder: Path) -> str:
-    """The stiff case by filterpy's own discretisation."""
+    """Without the remedy: this process noise by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
     times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()

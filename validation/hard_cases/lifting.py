@@ -42,12 +42,12 @@ Error = Callable[[str, Path], float]
 
 
 def vehicle(start: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
-    """The half car without symmetry on tyres that only push, over the flat road."""
+    """The half car without symmetry on tyres that can lift off, above a flat road."""
     return setups.vehicle(TWIN, geometry, start, {"lift_off": {}}, **override)
 
 
 def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) -> Error:
-    """Largest error of a run beside the exact path (m, rad, m/s, rad/s)."""
+    """Case: a bouncing vehicle. Error: largest difference (m, rad, m/s, rad/s) from the exact path."""
 
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(start, "linear", override)
@@ -60,7 +60,8 @@ def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) 
 
 
 def gained(**override: float) -> Error:
-    """Largest gain of energy over that of the motion, of a vehicle that falls and bounces."""
+    """Case: a vehicle that falls and bounces. Error: ratio of the largest gain of energy to the range of its vertical
+    kinetic energy."""
 
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(FALLING, "exact", override)
@@ -74,20 +75,20 @@ def gained(**override: float) -> Error:
 
 
 def at_the_switch(engine: str, folder: Path) -> float:
-    """Largest motion without gravity: the wheels rest on the road at no load: nothing may move, and no noise of
-    rounding grow."""
+    """Case: without gravity, wheels just touch the road at zero load. Error: largest motion, which must be 0, without
+    growth of rounding errors."""
     assembly = vehicle(np.zeros(8), "linear", {"g": 0.0})
     return setups.largest_magnitude(setups.run(engine, assembly, 1e-3, 1.0).states)
 
 
 def thrown_up(engine: str, folder: Path) -> float:
-    """Wheels that are thrown up from their rest at 5 m/s."""
+    """Case: wheels thrown up from rest at 5 m/s."""
     start = setups.vehicle(TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
     return exactly(start=start)(engine, folder)
 
 
 def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
-    """The half car without symmetry on a road of a scene."""
+    """The half car without symmetry on the road of a scene."""
     return assemble(
         build_scene(
             {
@@ -103,7 +104,7 @@ def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -
 
 
 def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
-    """Largest error of a run beside the solution at tight tolerance; infinite if no wheel left the road."""
+    """Largest difference of a run from the solution at tight tolerance; infinite if no wheel left the road."""
     states, exact = (
         setups.run(engine, assembly, step, duration).states,
         setups.tight_solution(assembly, step, duration).states,
@@ -113,12 +114,12 @@ def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) 
 
 
 def _heights(road: Signal | None, step: float, count: int) -> np.ndarray:
-    """The road under the front wheel (m, down)."""
+    """Road heights (m, down) under the front wheel."""
     return np.zeros(count) if road is None else road.sample(0.0, step, count)[:, 0]
 
 
 def coarse_road(engine: str, folder: Path) -> float:
-    """Bumps of 80 mm in a file with a sample every half metre, at 25 m/s."""
+    """Case: bumps of 80 mm at 25 m/s, from a file with a sample every 0.5 m."""
     s = 0.5 * np.arange(121)
     height = 0.08 * np.maximum(np.sin(2 * np.pi * s / 7.3), 0.0) * (s > 3.0)
     write_table(folder / "bumps.csv", {"s": ("m", s), "left": ("m", height), "right": ("m", height)})
@@ -127,7 +128,8 @@ def coarse_road(engine: str, folder: Path) -> float:
 
 
 def step_in_road(engine: str, folder: Path) -> float:
-    """A kerb of 0.1 m over 0.1 m, with corners, at 15 m/s: the front wheel is thrown off it."""
+    """Case: a ramp of 0.1 m height over 0.1 m length with sharp corners, at 15 m/s, which throws the front wheel off
+    the road."""
     profile = PolylineProfile.through([-5.0, 3.0, 3.1, 20.0], [0.0, 0.0, -0.1, -0.1])
     base = vehicle(setups.vehicle(TWIN).initial, "exact", {})
     road = RoadUnderWheels(profile, 15.0, base.parameters.a + base.parameters.b, (3.0, 3.1))
@@ -135,8 +137,8 @@ def step_in_road(engine: str, folder: Path) -> float:
 
 
 def in_space(engine: str, folder: Path) -> float:
-    """A car of 19 freedoms dropped from half a metre: largest difference of accelerations along its path to the written
-    ones, by the largest; of the written ones themselves, that of its centre of mass to gravity."""
+    """Case: a car with 19 freedoms dropped from 0.5 m. Error: relative difference of an engine's accelerations along
+    its path from the written equations; for these, of the centre of mass' acceleration from gravity."""
     car = replace(load_vehicle("r19_ride"), gravity=9.81).with_tyres(pushes_only=True)
     n = len(car.coordinates())
     start = np.array(
@@ -157,7 +159,8 @@ def in_space(engine: str, folder: Path) -> float:
 
 
 def above_a_cut(engine: str, folder: Path) -> float:
-    """Hub forces on a road of class F: largest force that a wheel in the air has, or pull of any, N."""
+    """Case: hub forces on a class F road. Error: largest force (N) on a hub whose wheel is in the air; infinite if none
+    is."""
     car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, 20.0, 1e-3, 1500)
@@ -167,14 +170,14 @@ def above_a_cut(engine: str, folder: Path) -> float:
 
 
 def linear_naive(folder: Path) -> str:
-    """The paper's tyre in the same fall."""
+    """Without the remedy: the paper's linear tyre in the same fall."""
     assembly = setups.vehicle(TWIN, "linear", FALLING)
     states, p = setups.run("reference", assembly, STEP, LASTING).states, assembly.parameters
     return f"the linear tyre pulls with up to {-(p.k1 * states[:, 0] + p.d1 * states[:, 4]).min():.0f} N"
 
 
 def hard_naive(folder: Path) -> str:
-    """A stable step that jumps over landings, without the check after the run."""
+    """Without the guard: a stable step that jumps over landings, without the check after the run."""
     with mock.patch.object(protocol, "check_resolved", lambda *_: None):
         off = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
     return f"stable, finite, a wheel's velocity off by {off:.2g} m/s"

@@ -18,14 +18,14 @@ CHECKS = {
 
 
 def cut_number(folder: Path) -> str:
-    """The value that numpy reads of a number that was cut off."""
+    """What numpy reads in place of a number that was cut off."""
     path = raw(csv.whole()[:-3].encode())(folder)
     last = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last:g}, which was {FX[-1]:g}"
 
 
 def invalid_samples(folder: Path) -> str:
-    """The values that asammdf reads of samples marked as invalid."""
+    """What asammdf reads in place of samples that are marked as invalid."""
     path = next(each for each in mdf4.FILES if each.name == "MDF 4 with invalid samples").make(folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
@@ -33,7 +33,7 @@ def invalid_samples(folder: Path) -> str:
 
 
 def cut_segment(folder: Path) -> str:
-    """The channels that npTDMS reads of a file that was cut off."""
+    """What npTDMS reads from a file that was cut off."""
     with Bounded(tdms.cut_by(100)(folder)) as file:
         lengths = [len(channel) for group in opened(folder, file).groups() for channel in group.channels()]
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
@@ -47,7 +47,7 @@ NAIVE = {
 
 
 def of_file(odd: OddFile) -> Case:
-    """The hard case of one file."""
+    """The hard case for one odd file."""
     return Case(
         name=odd.name,
         hard=odd.hard,
@@ -63,7 +63,7 @@ def of_file(odd: OddFile) -> Case:
 
 
 def of_sweep(sweep: CutSweep) -> Case:
-    """The hard case of a file that is cut off at many places."""
+    """The hard case for a file that is cut off at many places."""
     return Case(
         name=f"{sweep.extension} cut off at {sweep.cuts} places",
         hard="a library reads what is left, or what is not there",

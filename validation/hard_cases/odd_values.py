@@ -41,7 +41,8 @@ FRICTION, CELLS = 0.3, 15
 
 
 def far_below(implementation: str, folder: Path) -> float:
-    """Bent quarter cars on two roads that differ in waves longer than 60 m alone: largest difference of deviations.
+    """Case: nonlinear quarter cars on two roads that differ only in waves longer than 60 m. Error: largest relative
+    difference of the deviations.
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
@@ -69,7 +70,8 @@ def _bent(corner: float) -> tuple[SpatialVehicle, Excitation]:
 
 
 def slender(a: float, b: float) -> Callable[[str, Path], float]:
-    """A case of an ellipse under spin: FASTSIM's distance from the exact theory by the error that it states."""
+    """Case: a contact ellipse under spin. Error: ratio of FASTSIM's difference from the exact theory to the error that
+    it states."""
 
     def error(implementation: str, folder: Path) -> float:
         pair = MaterialPair()
@@ -86,14 +88,16 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
 
 
 def tiny_noise(implementation: str, folder: Path) -> float:
-    """Times to an angle for noise and angle that are both smaller: the same time, over 300 decades."""
+    """Case: drift-off times if noise and angle are scaled together over 300 decades. Error: relative difference of the
+    times, which must be equal."""
     off_time = drift_off_time(0.3, 1e-5, 1e-3)
     scaled = [drift_off_time(0.3, 1e-5 * s * s, 1e-3 * s) for s in (1e-145, 1e-100, 1e145)]
     return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
 def certain_filter(implementation: str, folder: Path) -> float:
-    """A filter of tilts told of angles and rates to 1e-12, forces to 1 and to 8 N: its deviations, by those told."""
+    """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
+    ratio of its deviations to those stated."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     fits = [
@@ -104,7 +108,7 @@ def certain_filter(implementation: str, folder: Path) -> float:
 
 
 def flipped(implementation: str, folder: Path) -> float:
-    """A saved result of which one bit turned round on the disk."""
+    """Case: one bit of a saved result was changed on the disk."""
     heave = np.linspace(1.0, 2.0, 64)
     Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(folder / "run.nc")
     content = bytearray((folder / "run.nc").read_bytes())
@@ -114,13 +118,13 @@ def flipped(implementation: str, folder: Path) -> float:
 
 
 def spiked() -> Any:
-    """A rail of which one point was measured 1 mm too low."""
+    """A rail profile with one point measured 1 mm too low."""
     rail = built_in("UIC60")
     return profile(rail.y, rail.z + 1e-3 * (np.arange(rail.z.size) == rail.z.size // 2))
 
 
 def rounded() -> Any:
-    """A rail whose points were written to 0.1 mm, so that its steep sides turn back from point to point."""
+    """A rail profile with points rounded to 0.1 mm, so that its steep sides go back and forth."""
     rail = built_in("UIC60")
     return profile(rail.y.round(4), rail.z.round(4))
 

@@ -35,12 +35,13 @@ AMPLITUDE, RATE = 0.02, 12.0
 
 
 def angle(t: np.ndarray) -> np.ndarray:
-    """The pitch (rad) of the clean cases."""
+    """Prescribed pitch (rad) of the cases without noise."""
     return AMPLITUDE * np.sin(RATE * t + 1.0)
 
 
 def scene(period: float = PERIOD, noise: float = 0.0) -> Assembly:
-    """The guided vehicle under its weight, pitch sampled every ``period``, with noise (rad) on the samples."""
+    """The vehicle under its weight with a prescribed pitch, sampled every ``period`` (s), with noise (rad) on the
+    samples."""
     base = vehicle()
     samples = angle(period * np.arange(round(DURATION / period) + 1))
     samples = samples + noise * np.random.default_rng(5).standard_normal(len(samples))
@@ -53,7 +54,7 @@ def _weight() -> Sampled:
 
 @cache
 def _settled_state() -> np.ndarray:
-    """A state in which the struts' fast modes have died, so that the comparison is one of multipliers."""
+    """State in which the fast suspension modes have decayed, so that only multipliers are compared."""
     base = vehicle()
     samples = angle(PERIOD * np.arange(-500, 2))
     before = setups.guided(base, _weight(), smooth_pitch(samples, PERIOD))
@@ -67,19 +68,19 @@ def _settled(base: Assembly) -> Assembly:
 
 @cache
 def solution(period: float = PERIOD, noise: float = 0.0) -> Trajectory:
-    """The pitch eliminated, order 8, tolerance 1e-12, rows every 1 ms."""
+    """Solution in which the pitch is eliminated, by order 8 at a tolerance of 1e-12, with rows every 1 ms."""
     return tight_solution(scene(period, noise), PERIOD, DURATION)
 
 
 def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
-    """Enforced moment (n,) in N m of that solution."""
+    """True enforced moment (n,) in N m, from that solution."""
     moment = solution(period, noise).moment
     assert moment is not None
     return moment
 
 
 def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
-    """Rms difference of the enforced moment in N m, from 20 ms on.
+    """Rms difference (N m) of the enforced moment from the exact one, from 20 ms on.
 
     Before, generalised-alpha forgets that its start has the right acceleration but not the right change of
     it: 6 N m that shrink by 0.6 per step, which the enforced-moment case shows on its own.
@@ -90,20 +91,20 @@ def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
 
 
 def recommended(engine: str, folder: Path) -> float:
-    """The enforced moment at 1 ms with the recommended settings."""
+    """Error of the enforced moment at 1 ms with the recommended settings."""
     path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine])
     return moment_error(path, truth()) / rms(truth())
 
 
 def soft_naive(folder: Path) -> str:
-    """MuJoCo's own equality constraint, target set before each step."""
+    """Without the remedy: MuJoCo's own equality constraint, with its target set before each step."""
     errors = [_soft_error(step) for step in (1e-3, 5e-4)]
     share = [error / rms(truth()) for error in errors]
     return f"MuJoCo's equality constraint: moment off by {share[0]:.0%} of its rms at 1 ms, {share[1]:.0%} at 0.5 ms"
 
 
 def _soft_error(step: float) -> float:
-    """Rms error (N m) of the moment of a soft equality constraint on the pitch joint."""
+    """Rms error (N m) of the moment of MuJoCo's soft equality constraint on the pitch joint."""
     assembly, count = scene(), round(DURATION / step)
     spec = specification(assembly.vehicle, settings("mujoco", step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -124,13 +125,14 @@ def _soft_error(step: float) -> float:
 
 
 def undamped_multiplier(engine: str, folder: Path) -> float:
-    """Generalised-alpha with spectral radius 1; the others eliminate the pitch and have no such setting."""
+    """Case: generalised-alpha with spectral radius 1 in Exudyn. Other implementations eliminate the pitch and have no
+    such setting."""
     path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine], spectral_radius=1.0)
     return moment_error(path, truth()) / rms(truth())
 
 
 class AsItComes(exudyn_engine.ExudynModel):
-    """Exudyn without our checks of its multiplier."""
+    """Exudyn's model without the checks of its multiplier."""
 
     _forces: np.ndarray | None = None
 
@@ -145,20 +147,19 @@ class AsItComes(exudyn_engine.ExudynModel):
 
 
 class Inconsistent(AsItComes):
-    """The prescribed pitch with an inconsistent start: the constraint's acceleration is not among the initial
-    values."""
+    """Exudyn's model whose start is inconsistent: its initial accelerations do not include the constraint's own."""
 
     def _consistent_start(self, options: object) -> None:
         self._first = np.zeros(1)
 
 
 def as_it_comes(assembly: Assembly, step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:
-    """Exudyn past all checks, with the spectral radius of its own default."""
+    """A run in Exudyn with all checks bypassed, with its default spectral radius."""
     return AsItComes(assembly, settings("exudyn", step, DURATION, integrator, spectral_radius=0.9)).run()
 
 
 def undamped_multiplier_naive(folder: Path) -> str:
-    """Exudyn past the check and with its own start, late in the run."""
+    """Without the guard: Exudyn with check bypassed and its own inconsistent start, late in the run."""
     parts = []
     for name, radius in (("GeneralizedAlpha", 1.0), ("TrapezoidalIndex2", 0.6)):
         engine_settings = settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
@@ -171,12 +172,12 @@ def undamped_multiplier_naive(folder: Path) -> str:
 
 
 def noisy(engine: str, folder: Path) -> float:
-    """Moment by noise of 1e-6 rad on the samples, in units of its finite-difference value."""
+    """Enforced moment caused by noise of 1e-6 rad on the samples, divided by its finite-difference value."""
     return _noisy(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
-    """Moment that noise of 1e-6 rad on samples every 0.125 ms causes, divided by its finite-difference value."""
+    """Enforced moment caused by noise of 1e-6 rad on samples every 0.125 ms, divided by its finite-difference value."""
     return _noisy(engine, 1.25e-4)
 
 
@@ -186,7 +187,7 @@ def _noisy(engine: str, step: float) -> float:
 
 
 def noisy_naive(folder: Path) -> str:
-    """Exudyn's default on linearly interpolated noisy samples."""
+    """Without the remedy: Exudyn's default on noisy samples that are interpolated linearly."""
     base = vehicle()
     samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
     assembly = setups.guided(_settled(base), _weight(), Straight(samples, PERIOD))
@@ -200,7 +201,8 @@ def noisy_naive(folder: Path) -> str:
 
 @dataclass(frozen=True)
 class Straight:
-    """A pitch with straight lines between its samples: rates that jump, no second derivative."""
+    """Prescribed pitch that is interpolated linearly between samples: its rate jumps, and it has no second
+    derivative."""
 
     angles: np.ndarray
     period: float
@@ -213,7 +215,7 @@ class Straight:
         return self.period
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
-        """Angle, rate and 0 at start + i step."""
+        """Angle, rate and 0 (for the second derivative) at start + i step."""
         place = np.round((start + step * np.arange(count)) / self.period, 9)
         index = np.minimum(place.astype(int), len(self.angles) - 2)
         slope = np.diff(self.angles)[index]
@@ -224,18 +226,18 @@ class Straight:
         return self.sample(time, 1.0, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:
-        """All samples."""
+        """Times of all samples, at which the rate jumps."""
         return self.period * np.arange(1, round(duration / self.period))
 
 
 def refined(engine: str, folder: Path) -> float:
-    """Error of the moment at 0.5 ms over that at 1 ms, data sampled every 1 ms."""
+    """Ratio of the moment's error at 0.5 ms to that at 1 ms, with data sampled every 1 ms."""
     errors = [moment_error(run(engine, scene(), h, DURATION, CONSTRAINED[engine]), truth()) for h in (1e-3, 5e-4)]
     return errors[1] / errors[0]
 
 
 def refined_naive(folder: Path) -> str:
-    """Exudyn on straight lines between noise-free samples."""
+    """Without the remedy: Exudyn with noise-free samples that are interpolated linearly."""
     errors = []
     for step in (1e-3, 5e-4):
         pitch = Straight(angle(PERIOD * np.arange(501)), PERIOD)
@@ -245,13 +247,13 @@ def refined_naive(folder: Path) -> str:
 
 
 def explicit(engine: str, folder: Path) -> float:
-    """The explicit fourth-order solver of each engine."""
+    """Error of the enforced moment by the explicit fourth-order solver of each engine."""
     path = run(engine, scene(), 1e-3, DURATION)
     return moment_error(path, truth()) / rms(truth())
 
 
 def explicit_naive(folder: Path) -> str:
-    """Exudyn's explicit solver with the constraint in it, past the check."""
+    """Without the guard: Exudyn's explicit solver with a constraint, check bypassed."""
     path = as_it_comes(scene(), 1e-3, "RK44")
     assert path.moment is not None
     off = largest_magnitude(path.states[:, 3] - angle(path.times))
@@ -260,7 +262,8 @@ def explicit_naive(folder: Path) -> str:
 
 
 def fed_back(engine: str, folder: Path) -> float:
-    """The pitch of an unconstrained run, prescribed: no moment is needed to follow it."""
+    """Case: the pitch of a free run is prescribed. Error: rms of the enforced moment, which should be 0, divided by
+    that of the inertia moment."""
     base = vehicle("asymmetric_twin")
     forces: Signal = static_forces(base, 2, DURATION, held=False)
     base.initial[3] += 0.05
@@ -274,7 +277,7 @@ def fed_back(engine: str, folder: Path) -> float:
 
 
 def gap(engine: str, folder: Path) -> float:
-    """Distance of the pitch from what was prescribed."""
+    """Largest difference of the pitch from the prescribed one."""
     assembly = scene()
     path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
     assert assembly.input is not None
@@ -282,7 +285,7 @@ def gap(engine: str, folder: Path) -> float:
 
 
 def gap_naive(folder: Path) -> str:
-    """The gap of the rate, which nothing enforces."""
+    """Difference of the pitch rate from the prescribed one, which no constraint enforces."""
     assembly = scene()
     path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None

@@ -41,8 +41,8 @@ WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
 
 
 def asked_again(engine: str, folder: Path) -> float:
-    """Largest difference of accelerations evaluated forwards, backwards and twice in time, with noise of 800 N on the
-    samples."""
+    """Case: accelerations with force noise of 800 N evaluated forwards, backwards and twice in time. Error: largest
+    difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
     forces = static_forces(base, 200, 1e-3, noise=800.0)
     model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))
@@ -54,7 +54,7 @@ def asked_again(engine: str, folder: Path) -> float:
 
 
 def streams(implementation: str, folder: Path) -> float:
-    """Largest correlation of any two streams, in standard errors of none, by what so many pairs allow."""
+    """Largest correlation between any two noise streams, divided by the size that chance allows among so many pairs."""
     paths = [
         normal(seed, path, BLOCK, 1, source=source)[:, 0]
         for seed in (0, 1)
@@ -67,7 +67,8 @@ def streams(implementation: str, folder: Path) -> float:
 
 
 def pieces_of_stream(implementation: str, folder: Path) -> float:
-    """A stream in pieces of odd lengths, last ones first, against the whole."""
+    """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
+    stream."""
     whole, edges = normal(9, 4, 3 * BLOCK, 3), [0, 1, BLOCK - 1, BLOCK, BLOCK + 7, 2 * BLOCK + 1, 3 * BLOCK]
     parts = [normal(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
     return float(np.abs(np.concatenate(parts[::-1]) - whole).max())
@@ -78,7 +79,7 @@ def _one_state() -> Excitation:
 
 
 def any_step(implementation: str, folder: Path) -> float:
-    """Variance of the road at half steps of 1e-3 to 30 corner lengths against q / (2 corner), in standard errors."""
+    """Error of the road's variance q / (2 corner) for half steps of 1e-3 to 30 corner lengths, in standard errors."""
     worst = 0.0
     for part in (1e-3, 0.1, 0.9, 2.5, 30.0):
         keeps = np.exp(-2.0 * part)  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
@@ -89,12 +90,13 @@ def any_step(implementation: str, folder: Path) -> float:
 
 
 def any_step_naive(folder: Path) -> str:
-    """Explicit Euler's variance, 1 / (1 - part / 2) of the true one."""
+    """Without the remedy: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
     return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
 
 
 def odd_delay(implementation: str, folder: Path) -> float:
-    """Distance of the axles in whole half steps against the wheelbase, relative; infinite if the heights differ."""
+    """Relative difference between the delay of the rear axle, in half steps, and the wheelbase; infinite if the axles'
+    heights differ."""
     worst = 0.0
     for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
@@ -107,14 +109,15 @@ def odd_delay(implementation: str, folder: Path) -> float:
 
 
 def odd_delay_naive(folder: Path) -> str:
-    """Correlation of the axles with the delay rounded to whole steps of 20 ms."""
+    """Without the remedy: correlation of the axles if the delay is rounded to steps of 20 ms."""
     length, speed, step = 2.7, SPEED, 0.02
     lag = round(length / (speed * step)) * speed * step
     return f"rounded to steps of 20 ms the axles stand {lag:.2f} m apart in place of {length} m"
 
 
 def attitude(implementation: str, folder: Path) -> float:
-    """Mean trace of the error of a noisy gyro on a turning body against 3 exp(-s^2 t), in standard errors."""
+    """Error of the mean trace of a noisy gyro's attitude error on a rotating body, against 3 exp(-s^2 t), in standard
+    errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
     start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
     attitudes = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
@@ -125,7 +128,7 @@ def attitude(implementation: str, folder: Path) -> float:
 
 
 def attitude_naive(folder: Path) -> str:
-    """Length of a quaternion that explicit Euler makes."""
+    """Without the remedy: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / RATE**0.5 * np.stack([normal(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
@@ -135,7 +138,8 @@ def attitude_naive(folder: Path) -> str:
 
 
 def no_growth(implementation: str, folder: Path) -> float:
-    """Variance of the pitch for 2 lambda t of 1e-12 to 600, either side of its series, against 60 digits, relative."""
+    """Relative error of the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series,
+    against 60 digits."""
     worst = 0.0
     for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES, np.nextafter(SERIES, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
@@ -151,13 +155,14 @@ def _law(x: Decimal) -> float:
 
 
 def no_growth_naive(folder: Path) -> str:
-    """The case without growth by the law as it is printed."""
+    """Without the remedy: the variance without growth by the formula as printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
 
 
 def indefinite(implementation: str, folder: Path) -> float:
-    """Most negative eigenvalue of the half car's covariance by the largest, from 2 to 60 m/s; states have own units."""
+    """Ratio of the most negative to the largest eigenvalue of the half car's covariance, with states scaled by their
+    deviations, at 2 to 60 m/s."""
     vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):

@@ -20,7 +20,8 @@ SIZE = 0.2
 def spoilt(
     check: str, place: str, size: float | None, spoil: bench.Spoil | None = None, **faults: Any
 ) -> Callable[[str, Path], float]:
-    """A case of one fault: ``check`` must speak first, and of no other place than ``place``."""
+    """Case: a recording with one fault. Error: that of the size found; infinite unless ``check`` reports it first, and
+    all findings name ``place``."""
 
     def error(implementation: str, folder: Path) -> float:
         findings = bench.planted(bench.measurement(road=ROAD), folder, spoil, **faults)

@@ -30,7 +30,8 @@ Change = Callable[[dict[str, Any]], object]
 
 
 def damped_tyre(implementation: str, folder: Path) -> float:
-    """Acceleration of the body against quadrature, where the force of the tyre, and it alone, is called infinite."""
+    """Error of the body acceleration with a damped tyre, against quadrature; the tyre's force alone must be reported as
+    infinite."""
     vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), one_track((0.0,), 0.3)
     covariance = stationary(excited(vehicle, road, SPEED))
     if [status == INFINITE for status in covariance.status] != [False, False, True]:
@@ -39,14 +40,16 @@ def damped_tyre(implementation: str, folder: Path) -> float:
 
 
 def damped_tyre_naive(folder: Path) -> str:
-    """Lyapunov's equation and the outputs without what reaches them directly."""
+    """Without the guard: variances by the Lyapunov equation if the white noise that reaches outputs directly is
+    ignored."""
     system = excited(linear(quarter(*CORNER, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED)
     silent = replace(system, D=tuple(0.0 * D for D in system.D))
     return f"C P C' gives the tyre force a standard deviation of {stationary(silent).deviation[2]:.0f} N"
 
 
 def free_accelerations(implementation: str, folder: Path) -> float:
-    """Accelerations of R19-free against the exact covariance after an hour, axles independent, relative."""
+    """Relative error of R19-free's accelerations against the exact covariance one hour after rest, with independent
+    axles."""
     vehicle = linear(load_vehicle("r19_free"), implementation)
     system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
@@ -55,7 +58,8 @@ def free_accelerations(implementation: str, folder: Path) -> float:
 
 
 def drifting(implementation: str, folder: Path) -> float:
-    """Rates of heading (t) and place (t^3) against the exact covariance after 1 and 2 hours, axles independent."""
+    """Errors of the growth rates of heading variance (as t) and lateral position variance (as t^3) against the exact
+    covariance after 1 and 2 hours, with independent axles."""
     vehicle = linear(steered(), implementation)
     system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     covariance = stationary(system)
@@ -67,7 +71,7 @@ def drifting(implementation: str, folder: Path) -> float:
 
 
 def undamped(corner: float) -> Callable[..., float]:
-    """A case of a body on a tyre without a damper: rates at which its motion grows, against S(w) / 2 w^2."""
+    """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
     def error(implementation: str, folder: Path) -> float:
         undamped_car = replace(single(300.0, 2e5, 0.0), springs=())
@@ -82,7 +86,8 @@ def undamped(corner: float) -> Callable[..., float]:
 
 
 def triple(implementation: str, folder: Path) -> float:
-    """Critically damped, and the road's corner at the same place: 3 q w^3 / 16 and 3 q / 16 w, relative."""
+    """Case: a critically damped body whose frequency is that of the road's corner. Error: relative difference of the
+    variances from 3 q w^3 / 16 and 3 q / 16 w."""
     w = 6.0
     covariance = stationary(
         excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED)
@@ -91,7 +96,7 @@ def triple(implementation: str, folder: Path) -> float:
 
 
 def triple_naive(folder: Path) -> str:
-    """The condition of the eigenvectors."""
+    """Without the remedy: condition number of the eigenvectors in this case."""
     system = excited(linear(single(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED)
     with np.errstate(all="ignore"):
         condition = np.linalg.cond(np.linalg.eig(system.A)[1])
@@ -99,12 +104,12 @@ def triple_naive(folder: Path) -> str:
 
 
 def unstable(implementation: str, folder: Path) -> float:
-    """A damper of the wrong sign: refused, with the growth rate of its fastest motion."""
+    """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
     return _refused_by_growth(linear(quarter(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
 
 
 def toppling(implementation: str, folder: Path) -> float:
-    """A body 30 m above its springs under gravity: refused, with the rate at which it topples."""
+    """Case: a body 30 m above its springs must be refused, with the rate at which it topples under gravity."""
     car = load_vehicle("seven_freedoms")
     x, y, _ = car.bodies[0].position
     tall = replace(car, gravity=9.81, bodies=(replace(car.bodies[0], position=(x, y, 30.0)), *car.bodies[1:]))
@@ -126,14 +131,14 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
 
 
 def crawling(implementation: str, folder: Path) -> float:
-    """A delay of 26,000 s between the axles against independent ones, relative."""
+    """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     late, apart = (_deviation(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
     return off(late, apart)
 
 
 def axles_at_one_place(implementation: str, folder: Path) -> float:
-    """Two axles at one x, delayed by nothing, against one input, relative."""
+    """Case: two axles at the same x, without delay. Error: relative difference from one common input."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
     delayed, equal = (_deviation(here, SPEED, word) for word in ("delayed", "equal"))
@@ -145,7 +150,8 @@ def _deviation(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delay
 
 
 def mirrored(implementation: str, folder: Path) -> float:
-    """Left springs twice as stiff, then the right ones: outputs on the centre line, relative."""
+    """Case: the left springs, then the right ones, are twice as stiff. Error: relative difference of the outputs on the
+    centre line."""
     car = load_vehicle("seven_freedoms")
     deviations = []
     for side in (1.0, -1.0):
@@ -159,7 +165,7 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 
 def slow_weighting(implementation: str, folder: Path) -> float:
-    """Body acceleration weighted by Wk at 1 mm/s against quadrature, relative."""
+    """Relative error of the body acceleration weighted by Wk at 1 mm/s, against quadrature."""
     vehicle = linear(quarter(*CORNER), implementation)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
     variance = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
@@ -168,7 +174,8 @@ def slow_weighting(implementation: str, folder: Path) -> float:
 
 
 def standstill(implementation: str, folder: Path) -> float:
-    """Variance of the road under each wheel from a stop to 10 m/s to a stop, relative to the first."""
+    """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
+    under each wheel."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
     height = varying_speed(vehicle, paper_road(vehicle.wheels), drive).height
@@ -176,7 +183,7 @@ def standstill(implementation: str, folder: Path) -> float:
 
 
 def no_speed(implementation: str, folder: Path) -> float:
-    """0, -1 and not a number: each must be refused by its name."""
+    """Case: speeds of -1, NaN, infinity and 0 must each be refused."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
         try:
@@ -189,7 +196,7 @@ def no_speed(implementation: str, folder: Path) -> float:
 
 
 def bad(change: Change, place: str) -> Callable[..., float]:
-    """A case of the half car's file with something wrong: refused by the entry's name."""
+    """Case: the half car's file with one wrong entry must be refused with the entry's name."""
 
     def error(implementation: str, folder: Path) -> float:
         table = parse(SHIPPED / "half_car.toml")

@@ -30,12 +30,12 @@ MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 
 
 def built_wheelset(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **options: Any) -> Equations:
-    """A wheelset in an implementation, with coarse cells."""
+    """The equations of a wheelset in an implementation, with few contact cells."""
     return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
 
 def displaced_state(equations: Equations, **values: float) -> np.ndarray:
-    """Rest, moved by values named as the state's numbers in ``equations``."""
+    """State at rest, displaced by values for the states named in ``equations``."""
     state = equations.rest.copy()
     for name, value in values.items():
         state[getattr(eq, name)] += value
@@ -43,7 +43,8 @@ def displaced_state(equations: Equations, **values: float) -> np.ndarray:
 
 
 def beyond_friction(motion: Motion, mu: float) -> float:
-    """Largest tangential force / (mu N) - 1; infinite for a force that adds energy, or that acts at zero friction."""
+    """Largest ratio of the tangential force to mu N, minus 1; infinite if a force adds energy, or acts at zero
+    friction."""
     force = np.hypot(motion.contacts["fx"], motion.contacts["fy"])
     bound = mu * motion.contacts["load"]
     if motion.contacts["power"].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
@@ -53,21 +54,22 @@ def beyond_friction(motion: Motion, mu: float) -> float:
 
 
 def standing(implementation: str, folder: Path) -> float:
-    """Speed at which a standing wheelset creeps sideways under a third of what friction could hold."""
+    """Case: a wheelset stands under a lateral force of a third of the friction limit. Error: its lateral creep speed
+    (m/s)."""
     equations = built_wheelset(implementation, HEAVY_WHEELSET, 0.0, lean=0.1)
     motion = equations.run(equations.rest, 0.04, 8e-5, 250)
     return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
 
 
 def standing_naive(folder: Path) -> str:
-    """Creepage by a speed that is not regularised."""
+    """Without the remedy: creepage by a speed of travel that is not regularised."""
     with np.errstate(divide="ignore"):
         return f"creepage by the speed of travel: {np.float64(1e-4) / np.float64(0.0)}"
 
 
 def reversal(implementation: str, folder: Path) -> float:
-    """Largest jump of an acceleration divided by mu N / m, as the speed passes 0 and where regularisation begins and
-    ends."""
+    """Largest jump of an acceleration, divided by mu N / m, where the speed passes 0 and the limits of its
+    regularisation."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
         below, above = (built_wheelset(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
@@ -77,7 +79,8 @@ def reversal(implementation: str, folder: Path) -> float:
 
 
 def through_zero(implementation: str, folder: Path) -> float:
-    """Kinetic energy of lateral motion and yaw beyond that of the start, by it, in runs of falling speed through 0."""
+    """Case: runs at falling speed through 0. Error: relative amount by which the kinetic energy of lateral motion and
+    yaw exceeds the initial one."""
     state, energies = None, []
     for speed in np.linspace(0.06, -0.06, 7):
         equations = built_wheelset(implementation, HEAVY_WHEELSET, float(speed))
@@ -94,7 +97,8 @@ def through_zero(implementation: str, folder: Path) -> float:
 
 
 def energies(motion: Motion, w: Wheelset) -> np.ndarray:
-    """Total energy (J) of a wheelset without suspension on elastic contacts: kinetic, of weight and of the contacts."""
+    """Energy (J) of a wheelset without suspension on elastic contacts: sum of kinetic energy, weight and contact
+    energy."""
     _, z, roll, _, _, vy, vz, roll_rate, yaw_rate, spin = motion.states.T
     turning = w.yaw_inertia * (roll_rate**2 + (yaw_rate * np.cos(roll)) ** 2) + w.spin_inertia * spin**2
     pressed = 0.4 * (motion.contacts["load"] * motion.contacts["depth"]).sum(axis=1)
@@ -102,7 +106,8 @@ def energies(motion: Motion, w: Wheelset) -> np.ndarray:
 
 
 def falling(implementation: str, folder: Path, **moved: float) -> float:
-    """Energy gained divided by that of 1 mm, of an elastic wheelset without friction that is let go above its rails."""
+    """Case: an elastic wheelset without friction is released above its rails. Error: gained energy, divided by that of
+    a fall by 1 mm."""
     elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
     wheelset = built_wheelset(implementation, elastic)
     motion = wheelset.run(displaced_state(wheelset, **moved), 0.06, 5e-5)
@@ -114,7 +119,8 @@ def falling(implementation: str, folder: Path, **moved: float) -> float:
 
 
 def bouncing(implementation: str, folder: Path) -> float:
-    """Height above that of release, by it, of a wheelset that rolls, with friction and damping."""
+    """Case: a rolling wheelset with friction and damping is released 1 mm above its rails. Error: ratio of the height
+    by which it rises above the release point to 1 mm."""
     wheelset = built_wheelset(implementation, FREE_WHEELSET)
     start = displaced_state(wheelset, Z=-1e-3)
     motion = wheelset.run(start, 0.2, 1e-4)
@@ -124,7 +130,8 @@ def bouncing(implementation: str, folder: Path) -> float:
 
 
 def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float:
-    """Load of both wheels of a toy against its weight, relative, creep forces bounded."""
+    """Case: a wheelset of a toy's mass at rest. Error: relative difference of its wheel loads from its weight; infinite
+    if creep forces exceed the friction limit."""
     toy = FREE_WHEELSET.changed(mass=mass, load=mass * GRAVITY, spin_inertia=0.1 * mass, yaw_inertia=mass)
     wheelset = built_wheelset(implementation, toy)
     motion = wheelset.run(wheelset.rest, 2e-3, 2e-4)
@@ -136,7 +143,7 @@ def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float
 
 
 def frictions(implementation: str, folder: Path) -> float:
-    """Force beyond mu N for mu from nothing to 1."""
+    """Largest relative excess of a force over mu N for friction coefficients from 0 to 1."""
     shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
         wheelset = built_wheelset(implementation, CHOSEN.changed(friction=mu), 60.0)
@@ -145,8 +152,8 @@ def frictions(implementation: str, folder: Path) -> float:
 
 
 def pure_spin(implementation: str, folder: Path) -> float:
-    """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, divided by mu N
-    (r)."""
+    """Case: steep cones roll without displacement, so that creepage is spin alone. Error: sum of both lateral forces,
+    and moments about the axle, divided by mu N and mu N r."""
     spinning = CHOSEN.changed(conicity=0.5)
     wheelset = built_wheelset(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
@@ -158,7 +165,7 @@ def pure_spin(implementation: str, folder: Path) -> float:
 
 
 def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
-    """Difference of a run from the one with half the step (m)."""
+    """Largest difference (m) of a run from a run with half the step."""
     equations = built_wheelset(implementation, wheelset, speed)
     start = equations.displaced(1e-3)
     ends = [equations.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
@@ -166,7 +173,7 @@ def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, 
 
 
 def crawling(implementation: str, folder: Path) -> float:
-    """Displacement at 1e-6 m/s against that of a wheelset that stands, by it."""
+    """Relative difference of the displacement at a speed of 1e-6 m/s from that of a standing wheelset."""
     rest = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
     runs = (
         built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest, 0.01, 8e-5) for speed in (0.0, 1e-6)
@@ -176,13 +183,14 @@ def crawling(implementation: str, folder: Path) -> float:
 
 
 def symmetric(implementation: str, folder: Path) -> float:
-    """Displacement, roll and yaw of a wheelset in the middle of the track, above its critical speed."""
+    """Case: a wheelset in the middle of the track above its critical speed. Error: displacement, roll and yaw, which
+    must stay 0."""
     equations = built_wheelset(implementation, CHOSEN, 80.0)
     return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
 def mirrored(implementation: str, folder: Path) -> float:
-    """A start and its mirror image, one wheel in the air: difference of the images."""
+    """Case: a start and its mirror image, with one wheel in the air. Error: difference of the mirrored paths."""
     equations = built_wheelset(implementation)
     start = displaced_state(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
     straight, other = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
@@ -190,7 +198,7 @@ def mirrored(implementation: str, folder: Path) -> float:
 
 
 def refused(implementation: str, folder: Path, place: str, run: Callable[[str], Any]) -> float:
-    """A case that is refused by a name."""
+    """Case that must be refused with the name ``place``."""
     try:
         run(implementation)
     except InputError as refusal:
@@ -208,7 +216,7 @@ def ran(
     speed: float = 40.0,
     **moved: float,
 ) -> Motion:
-    """A run from a state that is off rest."""
+    """A run that starts displaced from rest."""
     wheelset = built_wheelset(implementation, speed=speed)
     return wheelset.run(displaced_state(wheelset, **moved), duration, step, stride)
 
@@ -227,7 +235,7 @@ LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 
 def too_large_naive(folder: Path) -> str:
-    """The path without the check of loads, against that of an eighth of the step."""
+    """Without the guard: difference of a path without the check of loads from the path with an eighth of the step."""
     equations, ends = built_wheelset("reference"), []
     for step in (STEP, STEP / 8.0):
         states, contacts = np.empty((1, eq.STATES)), equations.blank(1)

@@ -42,7 +42,7 @@ R19 = replace(load_vehicle("r19_free"), drags=())
 
 
 def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray:
-    """Forces (count, 4) on wheels in their places with these rates (count, 4)."""
+    """Forces (count, 4) on wheels that are held in position and have velocities (count, 4)."""
     q, v, f = np.zeros(wheels.size), rates.ravel(), np.zeros(wheels.size)
     if implementation == "exudyn":
         f = np.array(Forces(wheels).of(list(q), list(v)))
@@ -59,14 +59,15 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
 
 
 def beyond_friction_share(wheels: Wheels, forces: np.ndarray) -> float:
-    """Largest force divided by mu N, less 1; infinite where one has power."""
+    """Largest ratio of the force to mu N, minus 1; infinite if a contact gains energy."""
     if (forces * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
     return max(0.0, float(np.hypot(forces[:, 0], forces[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
 
 
 def bounded(implementation: str, folder: Path, **changes: Any) -> float:
-    """Force beyond mu N at three speeds, zero included, and both theories that have a bound."""
+    """Largest relative excess of the force over mu N at three speeds, zero included, for both theories with a friction
+    limit."""
     shares = []
     for theory in ("fastsim", "simplified"):
         for speed in (20.0, 0.0, -20.0):
@@ -76,7 +77,7 @@ def bounded(implementation: str, folder: Path, **changes: Any) -> float:
 
 
 def jumps(implementation: str, folder: Path) -> float:
-    """Largest change of a force divided by mu N, as the speed passes 0 and both ends of what is mixed."""
+    """Largest change of a force, divided by mu N, where the speed passes 0 and the limits of the regularisation."""
     shares = []
     for middle in (-REGULAR, 0.0, REGULAR):
         backwards, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
@@ -86,14 +87,15 @@ def jumps(implementation: str, folder: Path) -> float:
 
 
 def spinning(implementation: str, folder: Path) -> float:
-    """Force along the rail divided by mu N, of wheels that do nothing but spin; infinite if there is none across."""
+    """Case: wheels with pure spin. Error: longitudinal force divided by mu N; infinite if there is no lateral force."""
     wheels = Wheels(cells=7)
     shares = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
     return float(np.abs(shares[:, 0]).max()) if np.abs(shares[:, 1]).min() > 1e-3 else np.inf
 
 
 def too_long(implementation: str, folder: Path) -> float:
-    """A step of 1 ms at 0.1 m/s: explicit, or implicit without the slopes of what sticks."""
+    """Case: a step of 1 ms at 0.1 m/s, explicit or implicit without slopes of the contact forces, which must be
+    refused."""
     wheels = Wheels(1, speed=0.1)
     start = (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
     if implementation == "exudyn":
@@ -106,8 +108,8 @@ def too_long(implementation: str, folder: Path) -> float:
 
 
 def jumping(implementation: str, folder: Path) -> float:
-    """Error of the energy balance of a wheelset whose contacts open and close, relative to the energy dissipated by
-    creep."""
+    """Error of the energy balance of a wheelset whose contacts open and close, divided by the energy that creep
+    dissipates."""
     equations = built_wheelset(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
     motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
@@ -127,14 +129,13 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
 
 
 def is_wrong(run: Drive) -> bool:
-    """Whether a contact has power, or more than mu N."""
+    """Whether a contact gains energy, or its force exceeds mu N."""
     force = np.hypot(run["fx"], run["fy"])
     return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
 
 
 def left_open(run: Drive) -> float:
-    """Energy at the end, divided by that of the start, that the powers of the run do not account for; its steps are
-    even."""
+    """Error of the energy balance over a run with equal steps, divided by the initial energy."""
     times, ends = run.run.times, [0, -1]
     few = Trajectory(times[ends], run.run.states[ends])
     first, last = energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
@@ -142,7 +143,7 @@ def left_open(run: Drive) -> float:
 
 
 def leaping(implementation: str, folder: Path) -> float:
-    """Energy that is left open by a car that leaves a ramp with all wheels and lands."""
+    """Case: a car leaves a ramp with all wheels and lands. Error: that of its energy balance."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
     loads = run["load"]
     up = (loads == 0.0).all(axis=1)
@@ -152,19 +153,19 @@ def leaping(implementation: str, folder: Path) -> float:
 
 
 def parked(implementation: str, folder: Path) -> float:
-    """Mean speed (m/s) of locked wheels on a slope, after the first swing."""
+    """Case: a car parked on a slope with locked wheels. Error: its mean speed (m/s) after the first swing."""
     run = drive(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
     return np.inf if is_wrong(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
 
 
 def locked(implementation: str, folder: Path) -> float:
-    """Force of locked wheels beside mu N against their sliding, divided by mu N."""
+    """Error of the force on locked wheels, divided by mu N; it should be mu N against the sliding."""
     run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
     return float(np.abs(run["fx"] / run.grip() + 1.0).max())
 
 
 def back(implementation: str, folder: Path) -> float:
-    """Energy that is left open by a car that rolls up a slope, stops and rolls back."""
+    """Case: a car rolls up a slope, stops and rolls back. Error: that of its energy balance."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
     ahead = run.velocity()[:, 0]
     if is_wrong(run) or not ahead[0] > 0.0 > ahead[-1]:

@@ -37,7 +37,7 @@ from validation.hard_cases.setups import (
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
-    """Largest error of sum m z' against the exact impulse of the forces, relative to the largest impulse."""
+    """Error of the momentum sum m z' against the exact impulse of the forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
     forces = Sampled(values, period, held=interpolation == "held")
     steps = round((len(values) - 1) * period / step)
@@ -52,13 +52,13 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: 
 
 
 def ramp(engine: str, folder: Path) -> float:
-    """Forces that rise by 1 N per sample: a sample read too early or too late shows at once."""
+    """Case: forces that rise by 1 N per sample, so that a sample read too early or too late is seen."""
     values = np.add.outer(np.arange(1001.0), np.array([0.0, 100.0]))
     return max(momentum_error(engine, "held", values, period, period) for period in (1e-3, 2e-3))
 
 
 def ramp_naive(folder: Path) -> str:
-    """Share of steps that read the wrong sample when accumulated time is truncated."""
+    """Without the remedy: share of steps that read the wrong sample if the accumulated time is truncated."""
     shares = []
     for step in (1e-3, 2e-3, 5.5e-3):
         times = np.cumsum(np.full(2000, step)) - step
@@ -71,13 +71,13 @@ def ramp_naive(folder: Path) -> str:
 
 
 def impulse(engine: str, folder: Path) -> float:
-    """Noise, held and linear, at two steps per sample: sum f dt is conserved."""
+    """Case: force noise, held and interpolated, with two steps per sample. Error: that of the impulse sum f dt."""
     values = 3800.0 + 800.0 * np.random.default_rng(3).standard_normal((251, 2))
     return max(momentum_error(engine, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
 
 
 def impulse_naive(folder: Path) -> str:
-    """Difference in pitch between the two rules for an impulse."""
+    """Difference of the pitch between both interpolations of an impulse."""
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
@@ -88,7 +88,8 @@ def impulse_naive(folder: Path) -> str:
 
 
 def halved(engine: str, folder: Path) -> float:
-    """Held noise at 2 ms, steps of 1 and 0.5 ms, against the matrix exponential on the samples."""
+    """Case: held noise sampled every 2 ms, in steps of 1 and 0.5 ms. Error: difference from the matrix exponential on
+    the samples."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 250, 2e-3, noise=500.0)
     truth = exact_states(setups.driven_by_forces(base, forces), 2e-3, 250, forces.values)
@@ -98,7 +99,8 @@ def halved(engine: str, folder: Path) -> float:
 
 @dataclass(frozen=True)
 class ByTime(Sampled):
-    """Held samples that every stage looks up at its own time: the last stage reads the next sample."""
+    """Faulty held samples: every stage reads the sample at its own time, so that the last stage of a step reads the
+    next sample."""
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step."""
@@ -107,7 +109,7 @@ class ByTime(Sampled):
 
 
 def halved_naive(folder: Path) -> str:
-    """Pitch under a force that is looked up at each stage's time."""
+    """Without the remedy: pitch under a force that is read at the time of each stage."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
     truth = exact_states(setups.driven_by_forces(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
@@ -123,14 +125,14 @@ def halved_naive(folder: Path) -> str:
 
 @cache
 def _points() -> tuple[np.ndarray, np.ndarray]:
-    """A smooth road measured every 0.237 m: no knot falls on a step."""
+    """Profile points of a smooth road every 0.237 m, none of which falls on a step."""
     s = 0.237 * np.arange(-20, 100)
     rise = np.clip(s / 3.0, 0, 1) ** 3
     return s, -0.02 * rise * np.sin(1.7 * s) - 0.004 * rise * np.sin(7.1 * s)
 
 
 def order(engine: str, profile: SplineProfile) -> float:
-    """Observed order over steps of 2, 1 and 0.5 ms, from the largest state difference over 1 s."""
+    """Observed order of convergence over steps of 2, 1 and 0.5 ms, from the largest state differences over 1 s."""
     base = vehicle()
     road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
     runs = [run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
@@ -139,18 +141,18 @@ def order(engine: str, profile: SplineProfile) -> float:
 
 
 def c2_road(engine: str, folder: Path) -> float:
-    """Order on the C2 road through the points."""
+    """Observed order on a road that is a C2 spline through the points."""
     return max(0.0, 4.0 - order(engine, SplineProfile.through(*_points())))
 
 
 def polyline_naive(folder: Path) -> str:
-    """Order on straight lines through the same points."""
+    """Without the remedy: observed order on straight lines through the points."""
     observed = order("reference", PolylineProfile.through(*_points()))
     return f"straight lines through the same points: order {observed:.1f}"
 
 
 def noise_adaptive(engine: str, folder: Path) -> float:
-    """An adaptive solver on held noise: restarted at each sample, or refused."""
+    """Case: an adaptive solver with held noise must restart at each sample, or be refused."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     base = vehicle(geometry="linear")
@@ -162,7 +164,7 @@ def noise_adaptive(engine: str, folder: Path) -> float:
 
 
 def noise_adaptive_naive(folder: Path) -> str:
-    """Error of noisy forces by scipy's RK45 straight across the jumps."""
+    """Without the remedy: error of scipy's RK45 that integrates across the jumps of noisy forces."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven_by_forces(base, forces)
@@ -179,7 +181,7 @@ def noise_adaptive_naive(folder: Path) -> str:
 
 
 def damaged(engine: str, folder: Path) -> float:
-    """A NaN in the 58th sample of a force file; the message must name its line."""
+    """Case: the 58th sample of a force file is NaN; the message must name its line."""
     values = np.full(301, 3825.9)
     values[57] = np.nan
     write_time_series(folder / "forces.csv", {"front": ("N", values), "rear": ("N", values)}, 1e-3)
@@ -201,7 +203,7 @@ def damaged(engine: str, folder: Path) -> float:
 
 
 def damaged_past_reader(engine: str, folder: Path) -> float:
-    """Largest state of a run on a NaN that was given past the reader: the guard after the run must see it."""
+    """Case: a NaN is passed around the file reader; the guard after the run must see it."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
@@ -209,7 +211,7 @@ def damaged_past_reader(engine: str, folder: Path) -> float:
 
 
 def uneven(engine: str, folder: Path) -> float:
-    """Samples every 1 ms, steps of 0.7 ms."""
+    """Case: steps of 0.7 ms with samples every 1 ms."""
     base = vehicle()
     forces = static_forces(base, 211, 1e-3, noise=500.0)
     return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 0.7e-3, 0.21).states)
@@ -217,14 +219,15 @@ def uneven(engine: str, folder: Path) -> float:
 
 @cache
 def _bump() -> RoadUnderWheels:
-    """A bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
+    """Road with a bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
     station = 0.1 * np.arange(2300)
     height = -0.05 * np.exp(-(((station - 200.0) / 0.15) ** 2))
     return RoadUnderWheels(run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
 
 
 def bump(engine: str, folder: Path) -> float:
-    """An adaptive solver (MuJoCo has none) that has seen nothing for ten seconds must not step over the bump."""
+    """Case: an adaptive solver, after ten seconds of flat road, must not step over the bump (MuJoCo has no adaptive
+    solver)."""
     name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
     assembly = vehicle().with_input("road", _bump())
     path = run(engine, assembly, 1e-3, 10.5, name)
@@ -233,7 +236,7 @@ def bump(engine: str, folder: Path) -> float:
 
 
 def bump_naive(folder: Path) -> str:
-    """The bump by scipy's LSODA with its default settings."""
+    """Without the remedy: the bump by scipy's LSODA with default settings."""
     assembly = vehicle().with_input("road", _bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
@@ -248,13 +251,13 @@ def bump_naive(folder: Path) -> str:
 
 
 def largest_pitch(states: np.ndarray) -> str:
-    """Largest pitch of states (8, n) as text."""
+    """Text with the largest pitch of states (8, n)."""
     return f"{np.abs(states[3]).max():.0e} rad"
 
 
 def _over_waves(engine: str, step: float, error: bool = False) -> Result:
-    """The half car on stiffly damped tyres over the study road at 560 m/s for 0.2 s, in whole steps of at most so many
-    seconds."""
+    """Run of the half car with stiffly damped tyres on the study road at 560 m/s for 0.2 s, in equal steps of at most
+    ``step`` (s)."""
     damped = {"parameters": "itwm_drift", "override": {"d1": 3000.0, "d2": 3000.0}}
     run = {"duration": 0.2, "step": 0.2 / math.ceil(0.2 / step - 1e-9)}
     road = {"road": {"source": "study", "speed": 560.0}}
@@ -262,9 +265,8 @@ def _over_waves(engine: str, step: float, error: bool = False) -> Result:
 
 
 def passed_over(engine: str, folder: Path) -> float:
-    """The study road at 560 m/s in steps of 2 ms, 1.1 m each: true error by the one that is told; infinite unless that
-    is a warning, or no answer at all, which ends in the step that it names, or where that names another one, in
-    this."""
+    """Case: the study road at 560 m/s in steps of 2 ms, or 1.1 m. Error: ratio of the true to the stated error.
+    Infinite unless this error is a warning, and the steps that the warnings name lead to a run without one."""
     told = _over_waves(engine, 2e-3, error=True)
     name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
@@ -277,8 +279,7 @@ def passed_over(engine: str, folder: Path) -> float:
 
 
 def passed_over_naive(folder: Path) -> str:
-    """Error of a run whose steps miss waves of the road: without its stated error, against steps that resolve every
-    wave."""
+    """Without the guard: error of a run whose steps miss waves of the road, against steps that resolve every wave."""
     ends = [_over_waves("reference", step)["z1_rate"][-1] for step in (2e-3, 1e-4)]
     return f"without its error the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
 

@@ -32,7 +32,7 @@ def vehicle(
     effects: dict[str, Any] | None = None,
     **override: float,
 ) -> Assembly:
-    """The vehicle at rest on the flat road, or in the state (8,) that is given."""
+    """The vehicle on a flat road, at rest or in a given state (8,)."""
     scene = build_scene(
         {
             "title": "hard case",
@@ -46,58 +46,60 @@ def vehicle(
 
 
 def driven_by_forces(base: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
-    """The vehicle cut off the road and driven by two wheel forces (N)."""
+    """The vehicle without its road, driven by two wheel forces (N)."""
     return base.without_tyres().with_input(mode, forces)
 
 
 def guided(base: Assembly, forces: Signal, pitch: Signal) -> Assembly:
-    """The driven vehicle whose pitch follows a signal with its two derivatives; it starts consistently."""
+    """The vehicle driven by forces, with a prescribed pitch signal that has two derivatives; its start is
+    consistent."""
     start = base.initial.copy()
     start[[3, 7]] = pitch.at(0.0)[:2]
     return replace(base.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
 
 
 def smooth_pitch(angles: np.ndarray, period: float) -> Smooth:
-    """Samples of a pitch angle (rad) as a scene reads them: a quintic spline with two derivatives."""
+    """Pitch samples (rad) in the form in which a scene reads them: a quintic spline with two derivatives."""
     return Smooth(angles[:, None], period, derivatives=2, degree=5)
 
 
 def static_forces(
     base: Assembly, count: int, period: float, held: bool = True, noise: float = 0.0, seed: int = 1
 ) -> Sampled:
-    """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) per sample."""
+    """Wheel forces (N) that carry the vehicle, with independent noise of a standard deviation (N) on each sample."""
     p, z = base.parameters, base.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
     return Sampled(carried + noise * np.random.default_rng(seed).standard_normal((count, 2)), period, held)
 
 
 def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
-    """Settings with the recommended integrator unless another is named."""
+    """Settings of a run; the recommended integrator is the default."""
     return Settings(integrator or RECOMMENDED[engine], step, duration, **options)
 
 
 def run(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
-    """A run as a user gets it: refused where it must be."""
+    """A run with all checks that a user's run has, so that it may be refused."""
     return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
 
 
 def unchecked(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
-    """Run a model without the checks before a run, so that only the guard after it stands."""
+    """A run without the checks before it; only the guard after the run is active."""
     engine_settings = settings(engine, step, duration, integrator, **options)
     return build_unchecked(engine, assembly, engine_settings).run()
 
 
 def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajectory:
-    """The independent solution: the paper's equations, order 8, relative tolerance 1e-12, rows every ``step``."""
+    """Independent solution of the paper's equations by order 8 at a relative tolerance of 1e-12, with rows every
+    ``step`` (s)."""
     return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
 
 
 def exact_states(assembly: Assembly, step: float, count: int, forces: np.ndarray | None = None) -> np.ndarray:
-    """States (count + 1, 8) of the linearised vehicle, exact by the matrix exponential.
+    """Exact states (count + 1, 8) of the linearised vehicle, by the matrix exponential.
 
     forces (count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
@@ -117,7 +119,7 @@ def exact_states(assembly: Assembly, step: float, count: int, forces: np.ndarray
 
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
-    """States (n, 8) of the linearised vehicle on the flat road at any times (n,) in s."""
+    """Exact states (n, 8) of the linearised vehicle on a flat road at any times (n,) in s."""
     poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
     rest = vehicle(geometry="linear").initial
     shares = np.linalg.solve(shapes, assembly.initial - rest)

@@ -39,7 +39,7 @@ NOISE = 1e-6
 
 
 def sprung(band: float) -> Assembly:
-    """The vehicle under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
+    """The vehicle under its weight, rotating at 0.4 rad/s, with a pitch spring that has a dead band (rad)."""
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
@@ -49,7 +49,7 @@ def sprung(band: float) -> Assembly:
 
 
 def kink(engine: str, folder: Path) -> float:
-    """Pitch over many crossings of the band's edges."""
+    """Error of the pitch after many crossings of the dead band's edges."""
     path = run(engine, sprung(BAND), STEP, DURATION)
     return largest_magnitude((path.states - _kink_truth().states)[:, 3])
 
@@ -60,7 +60,7 @@ def _kink_truth() -> Trajectory:
 
 
 def kink_naive(folder: Path) -> str:
-    """Error at the kink with Exudyn's limit stops in place of the force law."""
+    """Without the remedy: error of Exudyn's limit stops in place of the force law."""
     with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
         pitch_error = kink("exudyn", folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
@@ -82,7 +82,7 @@ def _limit_stop(build: exudyn_engine.Build, spring: PitchSpring) -> None:
 
 
 def never_left(engine: str, folder: Path) -> float:
-    """A band that is wider than the motion, against no spring at all."""
+    """Case: a dead band wider than the motion. Error: difference from a run without the spring."""
     tied = sprung(1.0)
     free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
     between, other = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
@@ -90,7 +90,7 @@ def never_left(engine: str, folder: Path) -> float:
 
 
 def beside_held(moment_held: bool = False) -> Assembly:
-    """A moment of 2 kN m at 20 Hz beside held forces with noise, both sampled every 4 ms."""
+    """The vehicle under held noisy forces and a moment of 2 kN m at 20 Hz, both sampled every 4 ms."""
     base = vehicle("asymmetric_twin")
     assembly = driven_by_forces(base, static_forces(base, 126, 4e-3, noise=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
@@ -98,7 +98,7 @@ def beside_held(moment_held: bool = False) -> Assembly:
 
 
 def moving_moment(engine: str, folder: Path) -> float:
-    """Pitch under held forces and a moment that is not held."""
+    """Error of the pitch under held forces and a moment that is interpolated."""
     path = run(engine, beside_held(), STEP, DURATION)
     return largest_magnitude((path.states - _moving_truth().states)[:, 3])
 
@@ -109,13 +109,13 @@ def _moving_truth() -> Trajectory:
 
 
 def moving_moment_naive(folder: Path) -> str:
-    """Error with a stabilising moment that is constant over a sample, like the forces."""
+    """Without the remedy: error if the moment is held over a sample like the forces."""
     path = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
     return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
-    """0, if a run in steps of 1 ms under a moment that is sampled every 1.5 ms is not refused, as it must be."""
+    """Case: a moment sampled every 1.5 ms in a run with steps of 1 ms must be refused; returns 0 if it is not."""
     moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
     run(engine, replace(beside_held(), moment=moment), STEP, DURATION)
     return 0.0
@@ -123,7 +123,7 @@ def moment_off_the_grid(engine: str, folder: Path) -> float:
 
 @cache
 def _free_motion() -> np.ndarray:
-    """States every 0.25 ms of the vehicle under its weight, released from a tilt."""
+    """States every 0.25 ms of the vehicle under its weight, released from a tilted position."""
     base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
     assembly = driven_by_forces(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
@@ -131,8 +131,8 @@ def _free_motion() -> np.ndarray:
 
 
 def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
-    """Assembly whose motion is prescribed, with noise (m, rad) on its samples, to a vehicle with ``mass`` times its
-    chassis."""
+    """Assembly of a vehicle with prescribed heave and pitch. ``noise`` (m, rad) is added to the samples; the chassis'
+    mass is multiplied by ``mass``."""
     states = _free_motion()
     motion = states[:, 2:4] + noise * np.random.default_rng(7).standard_normal((len(states), 2))
     base = vehicle("asymmetric_twin")
@@ -163,7 +163,8 @@ def missing_mass_naive(folder: Path) -> str:
 
 
 def rough_rails(engine: str, folder: Path) -> float:
-    """Noise of 1e-6 m and rad on the motion: the loads, in units of their finite-difference values."""
+    """Case: noise of 1e-6 m and rad on prescribed heave and pitch. Error: rms change of enforced force and moment,
+    divided by the finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
     enforced, clean = _guided(engine, on_rails(NOISE)).enforced, _guided("reference", on_rails()).enforced
     assert enforced is not None and clean is not None
@@ -172,7 +173,7 @@ def rough_rails(engine: str, folder: Path) -> float:
 
 
 def measured_pitch(folder: Path, **values: float) -> Assembly:
-    """A scene guided by a pitch with the noise of an inertial unit, 0.1 degrees at 1 kHz."""
+    """Write the files of a scene whose pitch is prescribed with the noise of an inertial unit: 0.1 degrees at 1 kHz."""
     t = STEP * np.arange(1001)
     noise = np.deg2rad(0.1) * np.random.default_rng(8).standard_normal(len(t))
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.05 * np.sin(6.0 * t) + noise)}, STEP)
@@ -185,7 +186,8 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
 
 
 def smoothed(engine: str, folder: Path) -> float:
-    """The moment after smoothing to 5 Hz, against the eliminated form."""
+    """Case: a pitch smoothed to 5 Hz is prescribed. Error: difference of the enforced moment from the form in which the
+    pitch is eliminated, divided by its rms."""
     assembly = measured_pitch(folder, bandwidth=5.0)
     moment = run(engine, assembly, STEP, 1.0, CONSTRAINED[engine]).moment
     true = run("reference", assembly, STEP / 8, 1.0).moment
@@ -194,20 +196,20 @@ def smoothed(engine: str, folder: Path) -> float:
 
 
 def smoothed_naive(folder: Path) -> str:
-    """The noisy pitch used without smoothing."""
+    """Without the remedy: the noisy pitch is used without smoothing."""
     raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
     assert raw is not None
     return f"without a bandwidth the moment is {rms(raw):.1e} N m rms, and Exudyn's multiplier raises"
 
 
 def beyond_nyquist(engine: str, folder: Path) -> float:
-    """A bandwidth above half of the file's sampling rate."""
+    """Case: a smoothing bandwidth above half of the file's sampling rate must be refused."""
     run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED[engine])
     return 0.0
 
 
 def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
-    """Check that a scene under wheel forces with these effects is refused."""
+    """Case: a scene under wheel forces with these effects must be refused."""
 
     def error(engine: str, folder: Path) -> float:
         measured_pitch(folder)  # writes the files

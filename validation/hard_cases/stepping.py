@@ -36,33 +36,33 @@ EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
 
 
 def _pushed(geometry: str = "linear"):
-    """One wheel 1 mm off its equilibrium."""
+    """The vehicle with one wheel displaced by 1 mm from equilibrium."""
     base = vehicle(geometry=geometry)
     return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
 
 
 def inside_limit(engine: str, folder: Path) -> float:
-    """RK4 at 3.9 ms for 300 steps: the fastest mode must have died."""
+    """Case: RK4 with 300 steps of 3.9 ms, just inside the stability limit; the fastest mode must have decayed."""
     assembly = _pushed()
     path = run(engine, assembly, 3.9e-3, 1.17)
     return largest_magnitude(path.states[-1] - exact_states(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
 def beyond_limit(engine: str, folder: Path) -> float:
-    """RK4 at 5 ms over 40 ms: eight steps, all values small and finite."""
+    """Case: RK4 with eight steps of 5 ms, beyond the stability limit, so that all values are still small and finite."""
     assembly = vehicle(effects=ROAD)
     path = run(engine, assembly, 5e-3, 0.04)
     return _against_tight(assembly, path.states, 5e-3)
 
 
 def _against_tight(assembly, states, step: float) -> float:
-    """Error of the states relative to the motion of the tight solution."""
+    """Largest difference of the states from the tight solution, divided by its largest displacement."""
     truth = tight_solution(assembly, step, (len(states) - 1) * step).states
     return largest_magnitude(states - truth) / largest_magnitude(truth - truth[0])
 
 
 def beyond_limit_naive(folder: Path) -> str:
-    """The run beyond the stability limit without the check."""
+    """Without the guard: the run beyond the stability limit."""
     assembly = vehicle(effects=ROAD)
     shares = [
         _against_tight(assembly, unchecked(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
@@ -71,13 +71,13 @@ def beyond_limit_naive(folder: Path) -> str:
 
 
 def reset(engine: str, folder: Path) -> float:
-    """RK4 at 8 ms past the checks: only the guard after the run is left."""
+    """Case: RK4 at 8 ms with checks bypassed, so that only the guard after the run remains."""
     assembly = vehicle(effects=ROAD)
     return _against_tight(assembly, unchecked(engine, assembly, 8e-3, 2.0).states, 8e-3)
 
 
 def reset_naive(folder: Path) -> str:
-    """MuJoCo as it comes: the state is reset and time begins again."""
+    """Without the guard: MuJoCo resets the state, and its time starts again."""
     model = mujoco_engine.MujocoModel(_pushed("exact"), settings("mujoco", 8e-3, 2.0)).model
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
@@ -91,13 +91,13 @@ def reset_naive(folder: Path) -> str:
 
 
 def huge(engine: str, folder: Path) -> float:
-    """A first-order explicit run at 5 ms past the checks."""
+    """Case: a first-order explicit method at 5 ms with checks bypassed."""
     assembly = vehicle(effects=ROAD)
     return _against_tight(assembly, unchecked(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
 
 
 def huge_naive(folder: Path) -> str:
-    """Exudyn's own verdict and the largest finite state."""
+    """Without the guard: Exudyn's own success flag, and the largest finite state."""
     assembly = vehicle(geometry="linear", initial=_pushed().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     said = not solve(model.built.mbs, model.settings)
@@ -106,7 +106,7 @@ def huge_naive(folder: Path) -> str:
 
 
 def sudden(engine: str, folder: Path) -> float:
-    """Front force up by 1 kN from one sample to the next, 1 ms steps."""
+    """Case: the front force rises by 1 kN from one sample to the next, in steps of 1 ms."""
     assembly, forces = _step_force()
     path = run(engine, assembly, 1e-3, 0.2)
     truth = exact_states(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
@@ -122,7 +122,7 @@ def _step_force():
 
 
 def sudden_naive(folder: Path) -> str:
-    """Generalised-alpha with a step that does not see the fast pole."""
+    """Without the remedy: generalised-alpha with a step that does not resolve the fast pole."""
     assembly, forces = _step_force()
     path = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
     truth = exact_states(assembly, 10e-3, 20, forces.values)
@@ -134,7 +134,8 @@ def sudden_naive(folder: Path) -> str:
 
 
 def repeat(engine: str, folder: Path) -> float:
-    """Difference between two runs of one model, asked for an acceleration in between: the same bits."""
+    """Case: a model is run twice, with an acceleration evaluated in between. Error: difference of the runs, which must
+    be 0."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
@@ -148,7 +149,8 @@ def repeat(engine: str, folder: Path) -> float:
 
 
 def restart(engine: str, folder: Path) -> float:
-    """Stopped after half the time and continued from the saved state."""
+    """Case: a run is stopped at half its time and continued from the saved state. Error: difference from the
+    uninterrupted run."""
     base = vehicle()
     forces = static_forces(base, 400, 1e-3, noise=500.0)
     whole = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
@@ -157,7 +159,7 @@ def restart(engine: str, folder: Path) -> float:
 
 
 def stamps(engine: str, folder: Path) -> float:
-    """An adaptive run, each row compared at its own time."""
+    """Error of an adaptive run, with each row compared at its own time."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     assembly = _pushed()
@@ -166,7 +168,7 @@ def stamps(engine: str, folder: Path) -> float:
 
 
 def stamps_naive(folder: Path) -> str:
-    """Rows taken for times."""
+    """Without the remedy: error if row numbers are used as times."""
     assembly = _pushed()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
     off = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
@@ -181,7 +183,7 @@ ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
 def keeps_order(engine: str, folder: Path) -> float:
-    """Amount by which the observed order falls short while the step is halved four times, from 2 ms on."""
+    """Amount by which the observed order falls below the declared one, over four halvings of a step of 2 ms."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact_states(base, 0.1, 2)[-1], []

@@ -35,7 +35,7 @@ SEED = 81
 
 @cache
 def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
-    """Signals and their true samples (n, 60), one repetition and its seam."""
+    """Signals and their true samples (n, 60), for one repetition of the recording and the transition to the next."""
     car = r19()
     names = [element.name for element in car.elements]
     table = VirtualTable(
@@ -50,7 +50,7 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
 
 
 def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
-    """Samples (n, 60), block by block, of a recording of this length (s)."""
+    """Samples (n, 60) of a recording of a length (s), one block after the other."""
     signals, whole = pattern(repeated)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
     length, count = len(whole) - SEAM, round(seconds / PERIOD) + 1
@@ -66,7 +66,8 @@ def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
 
 
 def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
-    """The long run as a recording, without files and maps, made unless it exists; ``path`` is where its samples lie."""
+    """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
+    are missing."""
     signals, _ = pattern(repeated)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
     for values in blocks(seconds, repeated) if columns.done == 0 else ():
@@ -76,7 +77,7 @@ def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
 
 
 def sections() -> Sections:
-    """All sections, and where the accelerometers sit."""
+    """All sections in which forces are computed, and the positions of the accelerometers."""
     return Sections(
         r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in SENSOR_PLACES.items())
     )
@@ -90,18 +91,19 @@ def run_of(
     hold: AttitudeHold | None = None,
     step: float | None = None,
 ) -> SectionRun:
-    """A run of a recording in this folder, which is made unless it is there."""
+    """A run of a recording in this folder; the recording is made if it is missing."""
     recording = recorded(seconds, folder / "recording.f64", repeated)
     return SectionRun(r19(), recording, sections(), engine, hold or AttitudeHold(), step)
 
 
 def answers_of(folder: Path, name: str = "run") -> bytes:
-    """All bits of the answers of a run."""
+    """All computed channels of a run, as bytes."""
     return (folder / name / "run.f64").read_bytes()
 
 
 def killed(folder: Path, seconds: float, repeated: float, block: float, times: int, lasting: float = 1.0) -> int:
-    """Run in a process of its own, killed (signal 9) so many times at random moments, until it ends; how often it ran.
+    """Run in a separate process, which is killed (signal 9) ``times`` times at random moments and restarted until it
+    ends; returns the number of starts.
 
     Moments are drawn from the ``lasting`` s after the first line of progress.
     """
@@ -128,7 +130,7 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
 
 
 def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
-    """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
+    """Start or continue a run. Prints a line per block: seconds done, peak memory (bytes), processor time (s)."""
 
     def told(completed: float, of: float) -> None:
         print(completed, peak_memory(), time.process_time(), flush=True)

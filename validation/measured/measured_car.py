@@ -31,7 +31,8 @@ TURNED = np.array([1.0, -1.0, -1.0])
 
 
 def samples(path: Path) -> np.ndarray:
-    """Samples (n, channels) in SI, ISO 8855: of the telephone, and roll and pitch of the camera's pose.
+    """Samples (n, channels) in SI units and ISO 8855 axes: of the telephone's sensors, and roll and pitch of its
+    camera.
 
     Roll and pitch are those of the vertical at the place where the car was, by the earth's centre.
     """
@@ -48,7 +49,7 @@ def samples(path: Path) -> np.ndarray:
 
 
 def recording(values: np.ndarray, path: Path) -> Recording:
-    """Samples (n, channels) as a recording; its columns lie at ``path``."""
+    """A recording object for samples (n, channels), which are written to ``path``."""
     columns = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
     columns.write(0, values)
     signals = tuple(
@@ -58,7 +59,7 @@ def recording(values: np.ndarray, path: Path) -> Recording:
 
 
 def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
-    """A scene of the public recording in files of three clocks.
+    """A scene of the public recording, with three files that have different clocks.
 
     Its map turns x forward, y right, z down into the axes of ISO 8855.
     """

@@ -32,12 +32,12 @@ Spoil = Callable[[VirtualMeasurement, np.ndarray], None]
 
 
 def columns(virtual: VirtualMeasurement, *names: str) -> list[int]:
-    """Numbers of channels."""
+    """Column numbers of the named channels."""
     return [[s.name for s in virtual.signals].index(name) for name in names]
 
 
 def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
-    """A change of a recording's samples, asked for by what it takes beside these."""
+    """Decorator: the function is called with its settings alone and returns a change of a recording's samples."""
 
     def made(*settings: Any, **named: Any) -> Spoil:
         return lambda virtual, samples: change(virtual, samples, *settings, **named)
@@ -47,13 +47,13 @@ def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
 
 @spoiling
 def times(virtual: VirtualMeasurement, samples: np.ndarray, factor: float, *names: str, add: float = 0.0) -> None:
-    """Samples of some channels, times a factor."""
+    """Fault: samples of some channels are multiplied by a factor, and a constant is added."""
     samples[:, columns(virtual, *names)] = factor * samples[:, columns(virtual, *names)] + add
 
 
 @spoiling
 def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
-    """All channels of hubs, exchanged."""
+    """Fault: all channels of two hubs are exchanged."""
     for pair in pairs:
         first, second = (columns(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB)) for hub in pair)
         samples[:, first + second] = samples[:, second + first]
@@ -61,34 +61,34 @@ def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[st
 
 @spoiling
 def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """Make a channel NaN from ``begin`` (s) on, for ``length`` (s)."""
+    """Fault: a channel is NaN for ``length`` (s) from ``begin`` (s) on."""
     first = round(begin / virtual.period)
     samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
 
 
 @spoiling
 def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """A channel that keeps its value from a time on, for another (s)."""
+    """Fault: a channel keeps its value for ``length`` (s) from ``begin`` (s) on."""
     first, (column,) = round(begin / virtual.period), columns(virtual, name)
     samples[first : first + round(length / virtual.period), column] = samples[first, column]
 
 
 @spoiling
 def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: float, height: float) -> None:
-    """One sample of a channel too high."""
+    """Fault: one sample of a channel is too high."""
     samples[round(time / virtual.period), columns(virtual, name)] += height
 
 
 @spoiling
 def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, share: float) -> None:
-    """The largest samples of a channel cut off."""
+    """Fault: the largest samples of a channel are cut off."""
     (column,) = columns(virtual, name)
     samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - share))
 
 
 @spoiling
 def referred(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hubs: str) -> None:
-    """Moments of hubs about a point so far (m) above them: (Mx + r Fy, My - r Fx)."""
+    """Fault: hub moments are about a point ``lever`` (m) above the hubs: (Mx + r Fy, My - r Fx)."""
     for hub in hubs:
         fx, fy, mx, my = columns(virtual, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
         samples[:, mx] += lever * samples[:, fy]
@@ -97,7 +97,7 @@ def referred(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hu
 
 @dataclass(frozen=True)
 class Planted:
-    """A fault: ``check`` and a part of the ``place`` that must be named, and the ``size`` in its ``unit``."""
+    """A planted fault, the ``check`` that must name it at a ``place``, and its ``size`` in ``unit``."""
 
     name: str
     check: str
@@ -112,7 +112,7 @@ class Planted:
 def measurement(
     vehicle: str = "r19_free", road: Ride = ("C", 1, 20.0, 15.0), rate: float = 500.0
 ) -> VirtualMeasurement:
-    """A car on a road; it and the four accelerometers are read at a rate (Hz)."""
+    """Virtual measurement of a car on a road, with four accelerometers, at a sampling rate (Hz)."""
     kind, seed, speed, duration = road
     virtual = VirtualTable(
         road=Road(iso8608=kind, seed=seed, speed=speed),
@@ -125,7 +125,8 @@ def measurement(
 
 
 def _vehicle(name: str) -> CutVehicle:
-    """R19-free; without any symmetry; with 80 kg on board; on springs 20 % stiffer; on dampers 30 % weaker."""
+    """Variants of R19-free by name: unchanged; without symmetry (twin); with 80 kg more (loaded); with springs 20 %
+    stiffer (stiff); with dampers 30 % weaker (worn)."""
     whole = load_vehicle("r19_free")
     body, *others = whole.bodies
     vehicles = {
@@ -144,7 +145,7 @@ def _sprung(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVe
 
 
 def errors_and_doubts(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
-    """Errors and doubts of samples (m, signals)."""
+    """Errors and doubts that the checks find in samples (m, signals)."""
     spoilt = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
     places = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
     claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
@@ -154,7 +155,7 @@ def errors_and_doubts(virtual: VirtualMeasurement, samples: np.ndarray, folder: 
 def planted(
     virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
 ) -> tuple[Finding, ...]:
-    """Findings on a recording with planted faults of its transducers, and spoilt samples."""
+    """Errors and doubts found in a recording with transducer faults and changed samples."""
     samples = virtual.samples(Faults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
     for change in spoil:
         if change is not None:
@@ -163,7 +164,8 @@ def planted(
 
 
 def drifting(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
-    """Findings where all but the hub forces is in a file whose clock is fast by a part."""
+    """Errors and doubts found if all signals but the hub forces come from a file whose clock runs fast by a
+    fraction."""
     samples, driving = virtual.samples(Faults(noise=NOISE), SEED), ("force", "moment")
     clock = virtual.period * np.arange(len(samples))
     for i in (i for i, s in enumerate(virtual.signals) if s.quantity not in driving):

@@ -17,20 +17,21 @@ PERIOD = 0.01
 
 @dataclass(frozen=True)
 class Recording:
-    """rates (n, 3) in rad/s, the telephone's own bias taken off; pose (n, 4), quaternions local to global."""
+    """A public recording: angular rates (n, 3) in rad/s without the telephone's bias; pose (n, 4) by the camera, as
+    quaternions from local to global axes."""
 
     rates: np.ndarray
     pose: np.ndarray
 
 
 def find() -> Path | None:
-    """The recording, None where TWINRIG_DATA does not lead to it."""
+    """Path of the recording; None if TWINRIG_DATA does not lead to it."""
     folder = data_folder()
     return folder / FILE if folder and (folder / FILE).is_file() else None
 
 
 def read(path: Path) -> Recording:
-    """Rates and pose on one clock: rates linear between their samples, poses along the shortest turn."""
+    """Rates and poses on a common clock. Rates are interpolated linearly, poses along the shortest rotation."""
     with np.load(path) as data:
         times, seen = data["gyro_t"], data["frame_t"]
         clock = np.arange(max(times[0], seen[0]), min(times[-1], seen[-1]), PERIOD)
@@ -41,6 +42,6 @@ def read(path: Path) -> Recording:
 
 
 def gyro_error(recording: Recording) -> np.ndarray:
-    """Angle (n,) in rad between the attitude that the gyro alone gives and the camera's, which starts it."""
+    """Angle (n,) in rad between the attitude by the gyro alone, started at the camera's attitude, and the camera's."""
     attitudes = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
     return np.linalg.norm(logarithm(product(conjugate(recording.pose), attitudes)), axis=1)

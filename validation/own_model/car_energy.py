@@ -14,7 +14,8 @@ BACKWARDS = ("rl swing", "rr swing", "rl spin", "rr spin")
 
 
 def energies_apart(handling: Handling, count: int) -> float:
-    """Largest difference of the energies (kinetic, weights, springs) at random states, of the largest energy.
+    """Largest difference between MuJoCo's energies and those by the description (kinetic, gravity, springs) at random
+    states, divided by the largest energy.
 
     Equal energies at all states are equal equations of motion, but for dampers and tyres.
     """
@@ -25,7 +26,7 @@ def energies_apart(handling: Handling, count: int) -> float:
 
 
 def _coordinate_names() -> dict[str, tuple[str, str]]:
-    """Coordinates of the description by the joints of the file."""
+    """For each coordinate of the description, the joint of the file that stands for it."""
     places = {"engine roll": ("engine joint 1", "rx"), "engine bounce": ("engine", "z")}
     for name in CORNERS:
         front = name.startswith("f")
@@ -37,7 +38,7 @@ def _coordinate_names() -> dict[str, tuple[str, str]]:
 
 
 def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """J, by MuJoCo's own model of the file in the pose of the car."""
+    """Energies (J) by MuJoCo's own model of the file, in the car's state."""
     model = mujoco.MjModel.from_xml_string(SALOON)
     data, coordinates = mujoco.MjData(model), handling.vehicle.coordinates()
     motion = SpatialReference(handling.vehicle).motions_of(q, v)["body"]
@@ -57,7 +58,7 @@ def _of_mujoco(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _energy_by_description(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
-    """J, by the description; springs without the preloads that the file does not have."""
+    """Energies (J) by the description, with springs that lack the preloads, as in the file."""
     places, springs = handling.vehicle.coordinates(), 0.0
     for e in handling.vehicle.joint_elements:
         travel = sum(k * q[places.index(at)] for at, k in zip(e.coordinates, e.factors, strict=True))

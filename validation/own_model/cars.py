@@ -7,7 +7,7 @@ RADIUS = 0.31
 
 
 def _front(name: str, sign: int) -> str:
-    """A strut with an upright, which steers, and a wheel that spins in it."""
+    """Text of a front strut with an upright that steers, and a spinning wheel on it."""
     x, y = CORNERS[name]
     return f"""
   <body name="{name} strut" pos="{x} {y} {RADIUS - 0.55}">
@@ -22,7 +22,7 @@ def _front(name: str, sign: int) -> str:
 
 
 def _rear(name: str, sign: int) -> str:
-    """A trailing arm on a hinge with a spring, and a wheel that spins at its end."""
+    """Text of a trailing arm on a hinge with a spring, and a spinning wheel at its end."""
     x, y = CORNERS[name]
     return f"""
   <body name="{name} arm" pos="{x + 0.4} {y - 0.1 * sign} {RADIUS + 0.02 - 0.55}">

@@ -116,7 +116,7 @@ HUNG = LINKED.replace(GRIP, '<connect name="grip" body1="box" anchor=".1 .2 .1"'
 
 
 def chain(count: int, seed: int = 1) -> str:
-    """A chain of hinges and slides with springs, dampers and armatures, all numbers at random."""
+    """A model file of a chain of hinges and slides with springs, dampers and armatures; all numbers are random."""
     draw = np.random.default_rng(seed)
 
     def row(low: float, high: float, size: int) -> str:
@@ -137,7 +137,7 @@ def chain(count: int, seed: int = 1) -> str:
 
 
 def tree(count: int, seed: int) -> str:
-    """Free bodies that carry branches of hinges, slides and balls, all numbers at random."""
+    """A model file of free bodies with branches of hinges, slides and balls; all numbers are random."""
     draw = np.random.default_rng(seed)
     children = dict[int, list[int]]()
     for i in range(1, count):
@@ -160,7 +160,7 @@ def tree(count: int, seed: int) -> str:
 
 
 def changed(text: str, name: str, old: str, new: str) -> str:
-    """A model's text in which a piece of text that follows a name is replaced by another."""
+    """A model's text in which ``old`` is replaced by ``new`` where it follows a name."""
     there = text.index(old, text.index(f'"{name}"'))
     return text[:there] + new + text[there + len(old) :]
 

@@ -21,7 +21,8 @@ QUATERNION = 0.5
 
 
 def softly_coupled(twin: TwinModel) -> Equations:
-    """Of a model whose constraints are all that is soft in it."""
+    """Equations of a model whose constraints are soft, by the law of MuJoCo's documentation; nothing else may be soft
+    in it."""
     tree, constraints = plain_tree(twin), plain_constraints(twin)
     give, scale = _compliance(twin), _scale(twin)
 
@@ -36,14 +37,14 @@ def softly_coupled(twin: TwinModel) -> Equations:
 
 
 def _scale(twin: TwinModel) -> np.ndarray:
-    """(c,): factors of the rows: points and couplings come first, then how axes turn."""
+    """Factors (c,) of the constraint rows: first those of couplings and points, then those of rotations."""
     driven = twin.driven
     welds = [QUATERNION * each.torque_scale for each in driven.connections if each.axes is not None]
     return np.concatenate((np.ones(len(driven.couplings) + 3 * len(driven.connections)), np.repeat(welds, 3)))
 
 
 def _compliance(twin: TwinModel) -> np.ndarray:
-    """(c,): R of every row."""
+    """Regularisation R (c,) of every constraint row."""
     driven, tree = twin.driven, plain_tree(twin)
     mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
     inverse = np.linalg.inv(mass)
@@ -59,7 +60,8 @@ def _share(solimp: tuple[float, ...]) -> float:
 
 
 def _lightness(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> np.ndarray:
-    """(2,): mean inverse inertias of both bodies together, of shifts (1/kg) and of turns (1/(kg m^2))."""
+    """Mean inverse inertias (2,) of a connection, summed over both bodies: for translation (1/kg) and for rotation
+    (1/(kg m^2))."""
     bodies, total = plain_tree(twin).bodies, np.zeros(2)
     motion = bodies.move(*np.zeros((2, twin.size)))
     for name in (name for name, _ in ends if name is not None):

@@ -49,12 +49,12 @@ def _compile(numeric, passive, time, position, velocity):
 
 @cache
 def law() -> Any:
-    """The callback, compiled when first asked for."""
+    """The callback, compiled at its first use."""
     return _compile(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
 
 
 class CompiledForces:
-    """A road-excited assembly as bare MuJoCo bodies and one compiled callback."""
+    """A vehicle on a road as a MuJoCo model of mere bodies, whose forces are all computed by one compiled callback."""
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
@@ -70,12 +70,12 @@ class CompiledForces:
         self.data = mujoco.MjData(self.model)
 
     def run(self) -> np.ndarray:
-        """States (n + 1, 8); without guards, for comparison and timing only."""
+        """States (n + 1, 8) of a run, without guards, for comparison and timing only."""
         with installed(law()):
             return self.coast()
 
     def coast(self) -> np.ndarray:
-        """A copy of the model with no forces but its weight."""
+        """A copy of the model with no forces except weight."""
         start = np.concatenate(([0.0], self.assembly.initial))
         path, _ = rollout.rollout(self.model, self.data, start[None, :], nstep=self.settings.steps)
         return np.vstack([self.assembly.initial, path[0, :, 1:9]])

@@ -26,14 +26,14 @@ HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
 
 
 class Taken(NamedTuple):
-    """Peak memory (bytes) and computing time (s) of the process that computed the contacts."""
+    """Peak memory (bytes) and computing time (s) of a process that computed a table of contacts."""
 
     memory: int
     seconds: float
 
 
 def write(path: Path, rows: int) -> None:
-    """A table of creepages from rolling to sliding; rows : a multiple of PERIOD."""
+    """Write a table of creepages from rolling to sliding; rows : a multiple of PERIOD."""
     lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(PERIOD))
     text = "".join(lines)
     with path.open("w") as file:
@@ -42,7 +42,7 @@ def write(path: Path, rows: int) -> None:
 
 
 def answered(folder: Path, rows: int) -> Taken:
-    """Answer a table of so many rows into ``forces.csv``, without errors, on few cells."""
+    """Compute a table of ``rows`` contacts into ``forces.csv``, without errors and with few cells."""
     write(folder / "cases.csv", rows)
     begun = time.perf_counter()
     counts = answer_table(
@@ -54,7 +54,7 @@ def answered(folder: Path, rows: int) -> Taken:
 
 
 def in_fresh_process(function: Callable[[Path, int], Taken], rows: int) -> Taken:
-    """What a function of a folder and a number of rows gives in a process of its own."""
+    """Result of function(folder, rows) in a process of its own."""
     with TemporaryDirectory() as name, processes(1) as executor:
         taken: Taken = executor.submit(function, Path(name), rows).result()
         return taken

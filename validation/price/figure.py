@@ -60,7 +60,8 @@ CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.lin
 
 
 def draw(measured_points: MeasuredPoints) -> Figure:
-    """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
+    """Figure of error over force calls and over time, side by side. Failed settings are marked above the first
+    panel."""
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
     styles = _styles(measured_points)
     top = 8 * max(measured_points.error(p) for p in measured_points.points if p.status == "ok")
@@ -98,7 +99,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
 
 
 def _styles(measured_points: MeasuredPoints) -> dict[str, Style]:
-    """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
+    """Style of each curve: colour by engine, marker by method, line by declared order (solid from 4 up)."""
     styles: dict[str, Style] = {}
     for curve, (first, *_) in measured_points.curves().items():
         setting, colour = first.setting, _colour(first, measured_points)
@@ -110,14 +111,14 @@ def _styles(measured_points: MeasuredPoints) -> dict[str, Style]:
 
 
 def _colour(point: Point, measured_points: MeasuredPoints) -> str:
-    """Colour of a point's implementation, or the next of FAMILY_COLOURS."""
+    """Colour of the engine of a point; engines without a colour of their own get one of FAMILY_COLOURS."""
     engine = point.setting.engine
     others = [name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS]
     return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[others.index(engine) % len(FAMILY_COLOURS)]
 
 
 def _curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
-    """One curve; points that the reference cannot judge are hollow."""
+    """Plot one curve. Points below the accuracy of the reference are hollow, and points timed once are small."""
     places = [(p.cost(kind), measured_points.error(p)) for p in points]
     ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     alike = defaultdict(list)
@@ -133,7 +134,7 @@ def _curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind:
 
 
 def _floor(ax: Axes, measured_points: MeasuredPoints) -> None:
-    """The band in which the reference itself is not certain."""
+    """Shade the errors that are below the accuracy of the reference."""
     known = measured_points.uncertainty[measured_points.quantity]
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
@@ -142,14 +143,14 @@ def _floor(ax: Axes, measured_points: MeasuredPoints) -> None:
 
 
 def _front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
-    """The settings that no other one beats, as a broad pale line behind the curves."""
+    """Plot the Pareto front, the settings that no other one beats, as a broad pale line behind the curves."""
     front = measured_points.front(kind)
     costs = [p.cost(kind) for p in front]
     ax.plot(costs, list(map(measured_points.error, front)), **FRONT, solid_capstyle="round", zorder=1)
 
 
 def _defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
-    """Ring and name each engine's default setting, where the panel is emptiest."""
+    """Mark each engine's default setting with a ring, and write its name where the panel has most space."""
     taken, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured_points.defaults.items():
@@ -176,12 +177,12 @@ def _defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
 
 
 def _fractions_of_panel(ax: Axes, places: Any) -> np.ndarray:
-    """Fractions of the panel (n, 2) of places in its units (n, 2)."""
+    """Positions (n, 2) as fractions of the panel, from positions (n, 2) in data units."""
     return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(places, float)))
 
 
 def _line_points(ax: Axes) -> np.ndarray:
-    """Places along all lines of a panel, in its fractions (n, 2)."""
+    """Points along all lines of a panel, as fractions (n, 2) of the panel."""
     points = [np.empty((0, 2))]
     for line in ax.get_lines():
         ends = _fractions_of_panel(ax, line.get_xydata())
@@ -190,7 +191,7 @@ def _line_points(ax: Axes) -> np.ndarray:
 
 
 def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
-    """The corner of CORNERS at which a name covers nothing, near its own place where several do.
+    """The corner of CORNERS at which a name covers no line; if several are free, the one near its setting.
 
     names : middles of names that stand already, through which no line to this one shall lead.
     """
@@ -204,7 +205,8 @@ def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarr
 
 
 def _failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
-    """A cross where each failed setting would have stood: stages times steps on the cost axis."""
+    """Mark each failed setting with a cross at the number of force calls that it would have needed, and list the
+    failures."""
     failed = [p for p in measured_points.points if p.status != "ok"]
     for p in failed:
         if calls := _expected(p, measured_points):
@@ -217,7 +219,7 @@ def _failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
 
 
 def _expected(p: Point, measured_points: MeasuredPoints) -> float:
-    """Expected cost of a failed setting, from its neighbours on the curve."""
+    """Force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
     work = measured_points.costs[0]
     if p.counts:
         return p.cost(work)
@@ -226,7 +228,7 @@ def _expected(p: Point, measured_points: MeasuredPoints) -> float:
 
 
 def _who(failed: list[Point], status: str) -> str:
-    """Methods without an answer, those with none at all named."""
+    """Text that names the methods with failed settings; methods without any answer are marked."""
     alike = [p for p in failed if p.status == status]
     if status == "flagged":
         return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in alike))
@@ -242,7 +244,7 @@ def _who(failed: list[Point], status: str) -> str:
 
 
 def _legend(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
-    """Handles of the legend: those of the curves first, then those of the other marks."""
+    """Handles of the legend: the curves, then the other marks."""
     names = sorted(styles, key=named)
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))

@@ -17,7 +17,7 @@ AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
 
 @contextmanager
 def _counted_loads() -> Iterator[list[int]]:
-    """Count the calls of the first load of every Exudyn model that is built in the block."""
+    """Context in which the calls of the first load are counted in every Exudyn model that is built."""
     from models.engines import exudyn
 
     calls = [0]
@@ -39,14 +39,14 @@ def _counted_loads() -> Iterator[list[int]]:
 
 
 def _mujoco_calls(model: Any) -> int:
-    """Evaluations of the forces that MuJoCo's timers have seen."""
+    """Number of force evaluations, from MuJoCo's timers."""
     import mujoco
 
     return int(model.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
 
 
 def counted(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
-    """Force calls of one run in Exudyn or MuJoCo as (counted from outside, said by the adapter)."""
+    """Force calls of one run in Exudyn or MuJoCo: as counted from outside, and as twinrig reports them."""
     if engine == "mujoco":
         model: Any = build(engine, assembly, settings)
         said = model.run().counts["force calls"]

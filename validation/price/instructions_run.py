@@ -19,7 +19,7 @@ MARK = "getpgid"
 
 
 def law_of(damping: list[list[float]], stiffness: list[list[float]]) -> Callable[[Any, Any], list[float]]:
-    """Forces -K q - D q' of lists."""
+    """Function that computes the forces -K q - D q' with lists."""
     rows = [(*k, *d) for k, d in zip(stiffness, damping, strict=True)]
 
     def law(q: Any, v: Any) -> list[float]:
@@ -31,7 +31,7 @@ def law_of(damping: list[list[float]], stiffness: list[list[float]]) -> Callable
 
 
 def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
-    """A function of a number of steps for each method."""
+    """For each method in Exudyn, a function that marches a number of steps."""
     import exudyn as exu
     import exudyn.itemInterface as items
     import numpy as np
@@ -64,7 +64,7 @@ def exudyn_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
 
 
 def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], methods: list[str]) -> list[Any]:
-    """The marches in MuJoCo's own loop."""
+    """For each method in MuJoCo, a function that marches a number of steps in MuJoCo's own loop."""
     import mujoco
 
     bodies = "".join(
@@ -90,7 +90,7 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
 
 
 def main(settings: dict[str, Any]) -> None:
-    """Every march once for warmth, then all of them in two copies of the process."""
+    """Run every march once to warm up, then count all of them in two copies of the process."""
     law = law_of(settings["damping"], settings["stiffness"])
     marches = [
         march
@@ -106,7 +106,7 @@ def main(settings: dict[str, Any]) -> None:
 
 
 def start_counting() -> None:
-    """Have valgrind count from here on: what it does not count, it runs several times as fast."""
+    """Make valgrind count instructions from here on; what runs before is not counted and several times as fast."""
     asking = subprocess.Popen(
         ["vgdb", f"--pid={os.getpid()}", "instrumentation", "on"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -117,7 +117,7 @@ def start_counting() -> None:
 
 
 def copied(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
-    """Count in a copy of the process, which leaves nothing behind in this one."""
+    """Run ``counted`` in a forked copy of the process, so that nothing changes in this one."""
     copy = os.fork()
     if copy == 0:
         counted(marches, numbers)
@@ -126,7 +126,8 @@ def copied(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
 
 
 def counted(marches: list[Callable[[int], None]], numbers: list[int]) -> None:
-    """Every march for each number of steps, with a mark before each and at the end; then the process is over."""
+    """Run every march for each number of steps, with a system call as mark before each and at the end; then exit the
+    process."""
     for march in marches:
         for steps in numbers:
             os.getpgid(0)

@@ -31,35 +31,36 @@ WORKERS = (2, 10, 100, 1000)
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Blocks of an ensemble: paths in each, and by how many times farther apart the rows are that travel."""
+    """An ensemble that is computed in blocks. block: number of paths in each; thinned: factor by which the time rows
+    that workers send back are thinned."""
 
     block: int = 50
     thinned: int = 1
 
     @property
     def seconds(self) -> float:
-        """A block takes a worker so long."""
+        """Computing time (s) of a block on a worker."""
         return self.block * PATH_SECONDS
 
     @property
     def bytes(self) -> float:
-        """What travels back of a block."""
+        """Size (bytes) of the result that a worker sends back for a block."""
         return self.block * PATH_BYTES / self.thinned
 
     @property
     def stations(self) -> dict[str, float]:
-        """Seconds of a block at what serves one block at a time."""
+        """Time (s) that each station (command, link, disk), which serves one block at a time, needs for a block."""
         return {"command": FIXED + PER_BYTE * self.bytes, "link": self.bytes / LINK, "disk": self.bytes / DISK}
 
     @property
     def most_workers(self) -> float:
-        """Workers that the slowest station can feed."""
+        """Number of workers that the slowest station can keep busy."""
         return self.seconds / max(self.stations.values())
 
 
 @dataclass(frozen=True)
 class WorkerShares:
-    """Share of the time for which workers compute, and for which each station is busy; blocks per second."""
+    """Shares of time for which the workers compute and for which each station is busy, and blocks per second."""
 
     workers: float
     stations: dict[str, float]
@@ -67,13 +68,13 @@ class WorkerShares:
 
     @property
     def bottleneck(self) -> str:
-        """What is busiest."""
+        """The station with the largest busy share, or the workers."""
         shares = {"workers": self.workers, **self.stations}
         return max(shares, key=lambda name: shares[name])
 
 
 def simulated(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
-    """A run of so many blocks by so many workers, from the first block that is sent to the last that is kept."""
+    """Simulate a run of ``blocks`` blocks by a number of workers, from sending the first block to saving the last."""
     seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, SCATTER, blocks).clip(0.5, 1.5)
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
@@ -81,7 +82,7 @@ def simulated(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
     ahead = max(BLOCKS_AHEAD, 2 * workers)
 
     def serve(station: str, takes: float, then: str, block: int) -> None:
-        """Take a block as soon as the station is idle."""
+        """Let a station serve a block as soon as it is idle."""
         idle[station] = max(idle[station], now) + takes
         heappush(events, (idle[station], next(order), then, block))
 
@@ -121,8 +122,8 @@ SETTINGS = {
 
 
 def table(rounds: int = 20) -> Iterator[str]:
-    """Rows of the table in the docs: share of time in which workers compute, and the busiest station at the largest
-    number of workers; rounds : blocks of each worker."""
+    """Rows of the table in the docs: share of time for which workers compute, and the busiest station with the most
+    workers. rounds : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
         outcomes = [simulated(ensemble, workers, rounds * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)

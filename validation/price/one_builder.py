@@ -48,14 +48,16 @@ Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Sides:
-    """A vehicle twice: as its system builds it, and by the free vehicles' builder; ``sign`` of the latter's axes."""
+    """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the
+    latter's coordinates relative to the former's."""
 
     system: Any
     free: FreeModel
     sign: float = 1.0
 
     def gap(self, count: int) -> float:
-        """Largest difference of the accelerations at random states, divided by the largest of the state."""
+        """Largest difference of the accelerations at random states, divided by the largest acceleration of the
+        state."""
         rng, worst = np.random.default_rng(SEED), 0.0
         for _ in range(count):
             q, v = rng.uniform(-0.05, 0.05, self.free.size), rng.uniform(-0.5, 0.5, self.free.size)
@@ -66,18 +68,19 @@ class Sides:
 
 
 def ride_vehicle() -> SpatialVehicle:
-    """Ride's 19 degrees of freedom without anti-roll bars."""
+    """The ride vehicle of 19 degrees of freedom without anti-roll bars."""
     return replace(load_vehicle("r19_ride"), bars=())
 
 
 def ride(engine: str) -> Sides:
-    """Ride's vehicle in an engine."""
+    """The ride vehicle in an engine, built by both builders."""
     vehicle, settings = ride_vehicle(), Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
     return Sides(in_space(engine, vehicle, settings), free_model(engine, driven(vehicle), settings))
 
 
 def pitch_plane(engine: str) -> Sides:
-    """The pitch plane's vehicle on its tyres in an engine; its axes count down, those of a vehicle in space up."""
+    """The pitch-plane vehicle on its tyres in an engine, built by both builders. Its coordinates count downward, those
+    of the free vehicle upward."""
     settings = Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
     scene = pitch_plane_scene({"title": "free", "run": {"duration": STEPS * STEP, "step": STEP}})
     assembly = replace(assemble(scene), mode="free", input=None, initial=np.zeros(8))
@@ -86,7 +89,7 @@ def pitch_plane(engine: str) -> Sides:
 
 
 def _raised(plane: Vehicle) -> SpatialVehicle:
-    """A vehicle in the plane as one in space."""
+    """A pitch-plane vehicle described as a vehicle in space."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
         if body.pitch_inertia is None
@@ -110,14 +113,14 @@ def _raised(plane: Vehicle) -> SpatialVehicle:
 
 
 def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
-    """A vehicle on a flat road for the free vehicles' builder, all its forces compiled."""
+    """A vehicle on a flat road for the builder of free vehicles, with all its forces compiled."""
     tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
     numbers = _force_table(tree, vehicle)
     return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
 
 
 def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
-    """The table of the compiled forces: every axis is fixed in space, and tyres begin on the ground."""
+    """Table of numbers for the compiled forces: all axes are fixed in space, and tyres act against the ground."""
     springs = [
         _element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
         for s in vehicle.springs
@@ -141,13 +144,14 @@ def _element(
 
 @contextmanager
 def one_tree() -> Iterator[None]:
-    """Within the block ride's builder in Exudyn has one tree of all bodies, and keeps its springs and callbacks."""
+    """Context in which the ride builder in Exudyn makes a single tree of all bodies, with unchanged springs and
+    callbacks."""
     with mock.patch.object(spatial_exudyn_build, "_trees", lambda vehicle: [list(vehicle.bodies)]):
         yield
 
 
 def ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
-    """Ratios of the processor's time of a run, by the builder of today, with their intervals."""
+    """Ratios of a run's processor time with another builder to that with the present one, each with its interval."""
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
         for system, sides in (("ride", ride(engine)), ("pitch plane", pitch_plane(engine))):

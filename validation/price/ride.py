@@ -44,8 +44,9 @@ KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
 
 @dataclass(frozen=True)
 class RoutePoint:
-    """One route. count : of what it is made, solves, points, frequencies or copies; errors : largest of each of KINDS,
-    relative; z : of the variances of a random one, largest; seconds : median, of long ones those of the one run."""
+    """One way to compute standard deviations. count, unit : amount of work (solves, points, frequencies or copies);
+    errors : largest relative error for each of KINDS; z : largest deviation of a random method's variances in standard
+    errors; seconds : median time, or that of a single run if it is long."""
 
     name: str
     unit: str
@@ -57,7 +58,7 @@ class RoutePoint:
 
 @dataclass(frozen=True)
 class PricedRide:
-    """The vehicle, the road in the paper's five cases, and the true standard deviations of the third."""
+    """The vehicle, the road in the paper's five cases of correlation, and the true standard deviations in case 3."""
 
     vehicle: LinearVehicle
     roads: dict[str, Excitation]
@@ -66,11 +67,11 @@ class PricedRide:
 
     @property
     def road(self) -> Excitation:
-        """Two tracks as modelled, the rear delayed."""
+        """The road of case 3: two tracks as modelled, with a delay for the rear axle."""
         return self.roads["3"]
 
     def errors(self, deviations: np.ndarray) -> dict[str, float]:
-        """Largest relative error of the standard deviations (p,) by kind of output."""
+        """Largest relative error of the standard deviations (p,), by kind of output."""
         off = np.abs(deviations / self.truth - 1.0)
         return {
             name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
@@ -79,7 +80,7 @@ class PricedRide:
 
 
 def problem() -> PricedRide:
-    """R19-ride at 20 m/s."""
+    """The priced problem: the vehicle R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
     roads = five_cases(vehicle.wheels)
     true = quadrature(vehicle, roads["3"], SPEED)
@@ -92,14 +93,15 @@ def direct(ride: PricedRide) -> np.ndarray:
 
 
 def fast(ride: PricedRide, count: int) -> np.ndarray:
-    """Five cases at ``count`` speeds by eigenvectors; those at SPEED."""
+    """Standard deviations at SPEED, from a sweep by eigenvectors over five cases of correlation and ``count``
+    speeds."""
     speeds = [*np.linspace(5.0, 50.0, count - 1), SPEED]
     return sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
 def grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = False) -> np.ndarray:
-    """Standard deviations by the trapezoidal rule on a grid up to ``highest_frequency`` (Hz), evenly spaced in the
-    frequency or in its logarithm."""
+    """Standard deviations by the trapezoidal rule on a frequency grid up to ``highest_frequency`` (Hz), evenly spaced
+    in frequency or in its logarithm."""
     frequency = (
         np.linspace(highest_frequency / count, highest_frequency, count)
         if even
@@ -110,7 +112,7 @@ def grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = Fa
 
 
 def measure(quick: bool, rounds: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
-    """All routes; counts and errors are judged, seconds are not."""
+    """Rows and data of all routes; counts and errors are judged, times are not."""
     ride = problem()
     swept = 3 if quick else SWEPT
     points = [_lyapunov(ride), _route_point_of_sweep(ride, swept)]
@@ -154,7 +156,7 @@ def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
 
 
 def judged(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
-    """Errors and counts against what they must be."""
+    """Rows that judge errors and counts of the routes."""
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]
     rows = [
@@ -219,7 +221,7 @@ def judged(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
 
 
 def table(data: dict[str, Any]) -> Table:
-    """Every route with its errors, counts and seconds."""
+    """Table of all routes with errors, counts and times."""
     lines = tuple(
         (
             p["name"],
@@ -238,7 +240,7 @@ def table(data: dict[str, Any]) -> Table:
 
 
 def draw(data: dict[str, Any]) -> tuple[str, Figure]:
-    """Error over milliseconds, a panel per kind of output."""
+    """Plot error over computing time (ms), with a panel per kind of output."""
     from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
 
     figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)

@@ -19,7 +19,7 @@ PROMISE = 1.25
 
 
 def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> list[Row]:
-    """All rows of one problem; the width of the sweep is asked of the full run only."""
+    """All rows of one problem; the row on the width of the sweep is part of the full run only."""
     points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
     return [
         _reference(problem, measured_points),
@@ -54,13 +54,13 @@ def _label(p: Point) -> str:
 
 
 def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
-    """Row that passes if a list of offenders is empty, and names them if it is not."""
+    """Row that passes if a list of offending settings is empty; it names them otherwise."""
     offenders = f": {', '.join(those)}" if those else ""
     return Observed(name, SYSTEM, what + offenders, len(those), "settings").within(0, 0, why, "closed form")
 
 
 def _reference(problem: Problem, measured_points: MeasuredPoints) -> Row:
-    """The reference must know more than the finest tolerance asks."""
+    """Row: the reference is more accurate than the finest tolerance requires."""
     quantity, share = measured_points.quantity, getattr(problem, "sure", REFERENCE_SHARE)
     return Observed(
         f"price.{problem.key}.reference",
@@ -77,7 +77,7 @@ def _reference(problem: Problem, measured_points: MeasuredPoints) -> Row:
 
 
 def _orders(measured_points: MeasuredPoints) -> list[Row]:
-    """Observed order of every fixed-step method that declares one, for every quantity."""
+    """Rows: observed order of every fixed-step method with a declared order, for each quantity."""
     settings = {p.setting.curve: p.setting for p in measured_points.points}
     return [
         Observed(
@@ -100,7 +100,7 @@ def _orders(measured_points: MeasuredPoints) -> list[Row]:
 
 
 def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
-    """Run the winners of the table of cheapest settings: their error must be what the table promises."""
+    """Row: the settings in the table of cheapest settings are run, and must keep their tolerances."""
     worst = 0.0
     for target in problem.tolerances:
         best = cheapest(measured_points.reaches(target, measured_points.costs[0]))
@@ -122,14 +122,15 @@ def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
 
 
 def _runnable_setting(problem: Problem, measured_points: MeasuredPoints, curve: str, least: ToleranceCost) -> Setting:
-    """The setting that the table names, a fixed step as the nearest one that divides the run."""
+    """The setting that the table names; a fixed step is changed to the nearest one that divides the run."""
     like = measured_points.curves()[curve][0].setting
     value = least.value if like.adaptive else problem.duration / round(problem.duration / least.value)
     return problem.setting(like.engine, like.method, value)
 
 
 def _sweep(measured_points: MeasuredPoints) -> Row:
-    """Six settings of each method, and from order 4 up four decades of them, or of error where nothing ends a curve."""
+    """Row: each method was tried widely enough, with at least six settings. From order 4 up they span four decades of
+    the setting or the error, unless the curve ends at a failure or at its smallest error."""
     tried, short = measured_points.curves(None), []
     for curve, points in measured_points.curves().items():
         errors, setting = list(map(measured_points.error, points)), points[0].setting
@@ -148,7 +149,7 @@ def _sweep(measured_points: MeasuredPoints) -> Row:
 
 
 def _losses(measured_points: MeasuredPoints) -> list[Row]:
-    """Rows: loss of each default at the middle tolerance."""
+    """Rows: loss of each engine's default setting relative to the cheapest one, at the middle tolerance."""
     return [
         row
         for owner, p in measured_points.defaults.items()

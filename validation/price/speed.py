@@ -19,7 +19,8 @@ STEP = 1e-3
 def callback_cost(
     driven: Assembly, duration: float, integrator: str, rounds: int, minimum_seconds: float
 ) -> dict[str, Any]:
-    """Paired ratios of one MuJoCo model: bare, with native springs and dampers, driven, all in one callback.
+    """Ratios of computing time between variants of a MuJoCo model: bare; with native springs and dampers; on a road;
+    with all forces in one callback.
 
     driven : a vehicle on a road, whose input enters through a compiled callback.
     Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s. ``gap`` is the largest

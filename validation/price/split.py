@@ -52,7 +52,7 @@ def damper(numbers, t, q, v, f):
 
 @njit(cache=True, error_model="numpy")
 def handed_damper(block, t, n):
-    """Set the damper's forces in one block of doubles at an address, f, q and v (n,) each."""
+    """Compute the damper's forces in one block of doubles at an address: f, q and v, (n,) each."""
     f = at(block)
     carray(f, (n,))[:] = 0.0
     damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
@@ -70,7 +70,7 @@ Runs = list[Callable[[], Any]]
 
 
 def _road_exudyn() -> Runs:
-    """The vehicle on a road that is flat: its forces by the reference's own right-hand side."""
+    """Exudyn's model of the vehicle on a flat road, whose forces the reference's own right-hand side computes."""
     assembly = assemble(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
@@ -130,7 +130,7 @@ MARCHES = {
 
 
 def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
-    """Seconds of the three runs in every round, by problem and engine."""
+    """Times (s) of the three runs (empty, cheap and real forces) in every round, by problem and engine."""
     seconds = interleave([job for make in MARCHES.values() for job in make()], rounds, minimum_seconds)
     return [
         {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
@@ -139,19 +139,19 @@ def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
 
 
 def parts(saved: Saved) -> np.ndarray:
-    """Microseconds a step of engine, bridge and kernel (3,), by the medians of the rounds."""
+    """Time per step in microseconds of engine, bridge and kernel (3,), from the medians of the rounds."""
     empty, cheap, real = (1e6 * float(np.median(saved["seconds"][run])) / STEPS[saved["problem"]] for run in RUNS)
     return np.array([empty, cheap - empty, real - cheap])
 
 
 def share(saved: Saved) -> tuple[float, float, float]:
-    """The bridge's share of a step in % with its 95 % interval, by the medians of resampled rounds."""
+    """Share of the bridge in the time of a step, in % with its 95 % interval, from medians over resampled rounds."""
     empty, cheap, real = (np.array(saved["seconds"][run]) for run in RUNS)
     return median(100.0 * (cheap - empty) / real)
 
 
 def rows(data: list[Saved]) -> list[Row]:
-    """The bridge's share, reported."""
+    """Rows on the share of the bridge, without a verdict."""
     return [
         Observed(
             f"price.{saved['problem']}.split.{saved['engine']}",

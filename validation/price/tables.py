@@ -22,7 +22,7 @@ def tables(measured_points: MeasuredPoints) -> list[Table]:
 
 
 def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
-    """A curve as a reader names it, with those that coincide with it."""
+    """Name of a curve for readers, followed by the names of curves that coincide with it."""
     alike = next((group for group in groups or [] if curve in group), (curve,))
     return " = ".join(map(_plain, sorted(alike, key=lambda other: other != curve)))
 
@@ -33,7 +33,7 @@ def _plain(curve: str) -> str:
 
 
 def cheapest(measured_points: MeasuredPoints) -> Table:
-    """The cheapest setting that meets each tolerance."""
+    """Table of the cheapest setting that keeps each tolerance."""
     work, groups = measured_points.costs[0], measured_points.same()
     rivals = [engine for engine in runner.RIVALS if any(p.setting.engine == engine for p in measured_points.points)]
     rows = []
@@ -57,7 +57,7 @@ def cheapest(measured_points: MeasuredPoints) -> Table:
 
 
 def rounds_of(points: list[Point]) -> str:
-    """Sentence: how many settings have how many timed rounds, and how far their seconds scatter."""
+    """Sentence on how many settings were timed in how many rounds, and how much the times scatter."""
     answered = [p for p in points if p.status == "ok"]
     in_rounds = [p.seconds for p in answered if p.changed is not None]
     numbers = Counter(map(len, in_rounds))
@@ -145,7 +145,7 @@ def _text_of_loss(loss: Loss | None) -> str:
 
 
 def every_curve(measured_points: MeasuredPoints) -> Table:
-    """A row per curve: settings, errors, observed order, what an error of 1 costs."""
+    """Table with a row per curve: settings, errors, observed order, and cost extrapolated to an error of 1."""
     groups, orders, work = (
         measured_points.same(),
         measured_points.orders(measured_points.quantity),
@@ -187,7 +187,7 @@ def every_curve(measured_points: MeasuredPoints) -> Table:
 
 
 def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | None) -> str:
-    """A mark for what rests on a setting that has no rounds."""
+    """The mark "~" if a result depends on a setting that was timed only once, else ""."""
     return (
         "~"
         if cheapest_reach is not None and any(p.changed is None for p in runner.resting(points, cheapest_reach))

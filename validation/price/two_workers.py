@@ -49,20 +49,20 @@ def ensemble_job(duration: float = 60.0) -> Any:
 
 
 def stretch(job: Any, numbers: list[int]) -> None:
-    """Blocks of a lone process, one after the other."""
+    """Compute some blocks of an ensemble one after the other in a single process."""
     for number in numbers:
         job(CUT.block(number, PATHS))
 
 
 def lone(pools: list[Executor], job: Any) -> None:
-    """Half of the blocks in each of two processes."""
+    """Compute an ensemble in two separate processes, each of which computes half of the blocks."""
     count = CUT.count(PATHS)
     wait([pool.submit(stretch, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
 
 
 @dataclass(frozen=True)
 class Sender:
-    """A job of blocks that only send so many numbers."""
+    """A job whose blocks compute nothing and send back ``numbers`` numbers per path."""
 
     numbers: int
 
@@ -71,12 +71,12 @@ class Sender:
         return {"x": np.zeros((len(paths), self.numbers))}
 
     def facts(self) -> dict[str, Any]:
-        """What a block depends on."""
+        """Settings on which a block depends."""
         return {"numbers": self.numbers}
 
 
 def cost_of_blocks(executor: Executor) -> dict[int, float]:
-    """Seconds of this process's processor for a block, by the numbers that it sends."""
+    """Processor time (s) of this process for a block, as a function of the numbers that the block sends back."""
     costs = {}
     for numbers in SIZES:
         run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
@@ -88,7 +88,7 @@ def cost_of_blocks(executor: Executor) -> dict[int, float]:
 
 @contextmanager
 def crews() -> Iterator[dict[str, Executor]]:
-    """Two workers of this machine, and two of a Dask cluster on it where that is installed."""
+    """Context with crews of two workers: on this machine and, if it is installed, in a local Dask cluster."""
     with ExitStack() as stack:
         pools: dict[str, Executor] = {"processes": stack.enter_context(processes(2))}
         with suppress(ImportError):
@@ -101,7 +101,8 @@ def crews() -> Iterator[dict[str, Executor]]:
 
 
 def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
-    """By crew: ``efficiency``, ``seconds`` of a turn, each with the ends of its interval; ``cost`` of a block (s)."""
+    """Measurement of each crew: ``efficiency`` relative to two separate processes and ``seconds`` of a run, both with
+    intervals; ``cost`` of a block (s)."""
     job = ensemble_job() if job is None else job
     with ExitStack() as stack, crews() as pools:
         alone: list[Executor] = [stack.enter_context(processes(1)) for _ in range(2)]
@@ -119,7 +120,7 @@ def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]
 
 
 def lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
-    """The measurement in words."""
+    """Text of the measurement."""
     answer = []
     for name, crew in measurement.items():
         ratio, low, high = crew["efficiency"]

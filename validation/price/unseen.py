@@ -52,7 +52,7 @@ CHANGED_PARAMETERS = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4",
 
 @dataclass(frozen=True)
 class DrawnScene:
-    """A drawn scene with a quantity and a tolerance to price."""
+    """A random scene with a quantity and a tolerance, for which a setting is to be recommended."""
 
     scene: Scene
     quantity: str
@@ -61,9 +61,9 @@ class DrawnScene:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a recommended setting. errors in the quantity's unit; floor : how well the search knew the truth;
-    slower : than the engine's default that meets the tolerance, in force calls, or beyond doubt in seconds, as ``kind``
-    says."""
+    """Verdict on a recommended setting. Errors are in the quantity's unit; floor : accuracy of the search's truth;
+    slower : whether the engine's default that keeps the tolerance is cheaper, in force calls or significantly in
+    seconds, depending on ``kind``."""
 
     title: str
     curve: str
@@ -82,8 +82,8 @@ class Verdict:
 
     @property
     def factor(self) -> float:
-        """Predicted divided by true error, or its inverse, whichever is above 1; errors below the floor count as the
-        floor."""
+        """Ratio of predicted to true error, or its inverse if this is above 1; errors below the floor are replaced by
+        the floor."""
         first, other = max(self.predicted, self.floor), max(self.true, self.floor)
         if first == other:
             return 1.0
@@ -91,7 +91,7 @@ class Verdict:
 
 
 def drawn(number: int, folder: Path) -> DrawnScene:
-    """Scene ``number``; its files go into ``folder``."""
+    """The random scene with this number; its files are written to ``folder``."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
     kind = KINDS[number % len(KINDS)]
     name, effects, more = kind(rng, folder, number)
@@ -168,7 +168,7 @@ KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
 
 
 def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -> str:
-    """A file of wheel forces: the weight, two waves and noise of each sample."""
+    """Write a file of wheel forces: weight, two sine waves, and noise on each sample."""
     times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
     forces = {
         wheel: (
@@ -184,7 +184,7 @@ def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -
 
 
 def judge(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
-    """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
+    """Verdicts on all settings recommended for a scene: among all these engines, and for each alone."""
     return verdicts(drawn_scene, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings))
 
 
@@ -193,7 +193,8 @@ def verdicts(
     engines: tuple[str, ...],
     true: Callable[[Recommendation, list[Setting]], dict[Setting, float]],
 ) -> list[Verdict]:
-    """Verdicts on drawn recommendations, by a function that gives the true error of each recommended setting."""
+    """Verdicts on the recommendations for a scene; the function ``true`` gives the true error of each recommended
+    setting."""
     recommendation = recommend(priced(drawn_scene.scene, drawn_scene.quantity, engines), drawn_scene.tolerance)
     errors = true(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))
@@ -215,8 +216,8 @@ def verdicts(
 
 
 def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
-    """Largest error of each setting over the whole run, against DOP853 at instants common to all steps where there are
-    any."""
+    """Largest error of each setting over the complete run, against DOP853. All settings are compared at common instants
+    where their steps have such."""
     runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine(scene, math.lcm(*parts.values()))
@@ -232,7 +233,7 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
 
 
 def _fine(scene: PricedPitchPlane, parts: int) -> int:
-    """A multiple of ``parts`` in which rows lie no further apart than COARSE_SPACING."""
+    """A multiple of ``parts`` for which rows are no further apart than COARSE_SPACING."""
     return parts * math.ceil(scene.base / parts / COARSE_SPACING * (1 - 1e-9))
 
 
@@ -241,7 +242,7 @@ def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
 
 
 def slower(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
-    """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
+    """Whether a default setting that keeps the tolerance would have been cheaper than the recommended one."""
     engine, kind = key
     rivals = [attempt for attempt in _defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
@@ -250,8 +251,8 @@ def slower(recommendation: Recommendation, key: tuple[str, str], choice: Setting
 
 
 def _defaults(recommendation: Recommendation) -> list[TriedSetting]:
-    """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
-    was searched: what is recommended may have forgotten one."""
+    """The coarsest setting of each default method that keeps the tolerance. If the complete run was searched, all tried
+    settings count, as the recommendation may have missed one."""
     if not recommendation.whole:
         return [
             each.refined.tried

@@ -40,7 +40,7 @@ Asked = tuple[dict[str, Any], list[str]]
 
 
 def drawn(system: str, number: int) -> DrawnScene:
-    """Scene ``number`` of a system, with a quantity and a tolerance."""
+    """A random scene of a system for a number, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
     table, quantities = {"wheelset": _wheelset, "handling": _handling, "braking": _braking}[system](rng)
     table |= {"title": f"{system} {number}", "system": system}
@@ -97,12 +97,13 @@ def _braking(rng: Random) -> Asked:
 
 
 def judge(drawn_scene: DrawnScene) -> list[Verdict]:
-    """A verdict on every setting that is recommended for a scene."""
+    """Verdicts on all settings recommended for a scene."""
     return verdicts(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
 
 
 def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
-    """Largest error of each setting over the whole run, beside a truth of another kind than the search's."""
+    """Largest error of each setting over the complete run, against a truth that is computed in another way than the
+    search's."""
     scene: Any = recommendation.scene
     ladder = scene.reference()
     finer = Setting(

@@ -15,7 +15,7 @@ from validation.replay.answers import JOBS, CommandAnswer, answer, difference, l
 
 
 def main(words: list[str]) -> int:
-    """Exit code 1 where a value, an exit code or a channel differs."""
+    """Record or check answers of all jobs. The exit code is 1 if a value, an exit code or a channel differs."""
     parser = argparse.ArgumentParser(prog="python -m validation.replay", description=__doc__)
     parser.add_argument("what", choices=("record", "check"))
     parser.add_argument("folder", type=Path, help="of the recording; one that was begun is gone on with")
@@ -66,7 +66,7 @@ def _chosen(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
 def _answers(
     jobs: list[asked.ReplayJob], arguments: argparse.Namespace
 ) -> Iterator[tuple[asked.ReplayJob, CommandAnswer]]:
-    """Answers as they come in the jobs' order, several commands at a time."""
+    """Answers in the order of the jobs; several jobs run at a time."""
     folder = Path(tempfile.mkdtemp(prefix="replay-"))
 
     try:

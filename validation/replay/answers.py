@@ -32,7 +32,8 @@ UNWATCHED = ("seconds", "folder", "command", "price", "range")
 
 @dataclass
 class CommandAnswer:
-    """Exit codes, message, seconds, arrays by "file: channel"; channels of printed tables belong to no file."""
+    """Recorded result of a job: exit codes, messages, seconds, and arrays by "file: channel"; channels of printed
+    tables have no file name."""
 
     codes: list[int]
     message: str
@@ -41,7 +42,7 @@ class CommandAnswer:
 
 
 def answer(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
-    """Run the commands of a job in a new folder, which is gone afterwards."""
+    """Run the commands of a job in a new folder that is deleted afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for file in SCENES.glob("*.[!t]*"):
@@ -57,7 +58,7 @@ def answer(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
 
 
 def _run_command(words: list[str], folder: Path, answer: CommandAnswer) -> None:
-    """Run one command, and add what it says."""
+    """Run one command, and add its exit code, message and printed tables to the answer."""
     begun = time.monotonic()
     code, said, wrong = _run(words, folder)
     answer.seconds += time.monotonic() - begun
@@ -97,7 +98,7 @@ def _json(text: str) -> Any:
 
 
 def _values_with_places(value: Any, place: str = "") -> Iterator[tuple[str, float | str]]:
-    """Numbers and texts of a printed table with their places."""
+    """Numbers and texts of a nested table, each with its place in the table."""
     if isinstance(value, dict | list):
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             if key not in UNWATCHED:
@@ -115,7 +116,7 @@ def _masked(text: str) -> str:
 
 
 def _arrays_of_files(folder: Path, given_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays of all files in the folder but those that were given."""
+    """Arrays of all files in the folder, except files that were there before."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
         if read is not None and path.name not in given_files:
@@ -150,12 +151,12 @@ def _column(cells: list[str]) -> np.ndarray:
 
 
 def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
-    """Keep what is asked, so that a later version is asked the same."""
+    """Save the jobs in the recording, so that a later version runs the same ones."""
     (folder / JOBS).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
 
 
 def read_jobs(folder: Path) -> list[ReplayJob]:
-    """The jobs of a recording."""
+    """The jobs that are saved in a recording."""
     return [
         ReplayJob(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
         for each in json.loads((folder / JOBS).read_text())
@@ -163,7 +164,7 @@ def read_jobs(folder: Path) -> list[ReplayJob]:
 
 
 def save(folder: Path, name: str, answer: CommandAnswer) -> None:
-    """Keep an answer; its note is written last."""
+    """Save an answer; its summary is written last, as a mark that it is complete."""
     arrays = {str(i): array for i, array in enumerate(answer.arrays.values())}
     np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **arrays)
     note = {"codes": answer.codes, "message": answer.message, "seconds": answer.seconds, "arrays": list(answer.arrays)}
@@ -171,7 +172,7 @@ def save(folder: Path, name: str, answer: CommandAnswer) -> None:
 
 
 def load(folder: Path, name: str) -> CommandAnswer | None:
-    """A kept answer, or None where there is none that is whole."""
+    """A saved answer; None if it is missing or incomplete."""
     try:
         note = json.loads((folder / f"{name}.json").read_text())
         with np.load(folder / f"{name}.npz") as file:
@@ -183,8 +184,8 @@ def load(folder: Path, name: str) -> CommandAnswer | None:
 
 @dataclass
 class AnswerDifference:
-    """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``tolerated`` (messages, new
-    channels) is told."""
+    """Differences between two answers, as sentences: those in ``wrong`` fail a replay, those in ``tolerated``
+    (messages, new channels) are reported only."""
 
     wrong: list[str] = field(default_factory=list)
     tolerated: list[str] = field(default_factory=list)
@@ -193,7 +194,7 @@ class AnswerDifference:
 def difference(
     recorded: CommandAnswer, current: CommandAnswer, bound: float, renamed: Mapping[str, str]
 ) -> AnswerDifference:
-    """Difference of an answer from a recorded one.
+    """Differences of an answer from the recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
     names of channels to later ones; a channel that is in another file now is looked for by its name.
@@ -218,7 +219,8 @@ def difference(
 
 
 def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
-    """Name of a channel in later arrays: its own, its new one, or that of the same channel in the only other file."""
+    """Name under which a channel occurs in later arrays: unchanged, renamed, or in another file if that is the only one
+    with this channel."""
     if (name_then := renamed.get(name, name)) in arrays:
         return name_then
     channel = name_then.partition(": ")[2]
@@ -227,7 +229,7 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
 
 
 def _changed(recorded: np.ndarray, current: np.ndarray, bound: float) -> str:
-    """Text on the changes of an array, "" if none is beyond the bound."""
+    """Text on how an array changed; "" if no change exceeds the bound."""
     if recorded.dtype.kind == current.dtype.kind == "U" and recorded.size == current.size == 1:
         return "" if recorded == current else f"{recorded} is {current}"
     if recorded.shape != current.shape or recorded.dtype != current.dtype:

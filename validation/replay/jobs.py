@@ -30,8 +30,8 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class ReplayJob:
-    """Commands in one folder: the words of each after ``twinrig``; the scene (TOML) that they read as ``scene.toml``,
-    if there is one."""
+    """Commands to run in one folder: the words of each after ``twinrig``, and the scene (TOML) that they read as
+    ``scene.toml``, if any."""
 
     name: str
     commands: tuple[tuple[str, ...], ...]
@@ -39,12 +39,12 @@ class ReplayJob:
 
 
 def jobs(command: str) -> list[ReplayJob]:
-    """All jobs; ``command``: the twinrig that lists the shipped scenes."""
+    """All jobs of a replay; ``command``: the twinrig executable that lists the shipped scenes."""
     return [ReplayJob("list", (("list",),)), *_shipped(command), *_written_jobs(), *_bases(), *_varied()]
 
 
 def _shipped(command: str) -> Iterator[ReplayJob]:
-    """Every scene that is listed: shown, and run."""
+    """Jobs for every listed scene: one shows it, one runs it."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
     said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
     for line in said.splitlines()[1:]:
@@ -61,7 +61,7 @@ def _written_jobs() -> Iterator[ReplayJob]:
 
 
 def _bases() -> Iterator[ReplayJob]:
-    """Every base scene as it is: shown, and run in every engine that it is for."""
+    """Jobs for every base scene without changes: one shows it, and one runs it in each of its engines."""
     from tomli_w import dumps
 
     for base in sorted(SCENES.glob("*.toml")):
@@ -86,7 +86,8 @@ def _varied() -> Iterator[ReplayJob]:
 
 
 def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJob:
-    """A base scene less some tables, with other numbers, another engine, perhaps a mistake."""
+    """Job with a random variant of a base scene: some tables removed, numbers changed, another engine, and sometimes a
+    mistake."""
     from tomli_w import dumps
 
     engines = scene.pop("engines_asked", ENGINES)
@@ -109,7 +110,7 @@ def _drop(scene: Table, random: np.random.Generator) -> None:
 
 
 def _places_of_numbers(table: Table, above: str = "") -> Iterator[str]:
-    """Places (keys joined by /) of all numbers that are not whole."""
+    """Paths (keys joined by /) of all numbers that are not integers."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from _places_of_numbers(value, f"{above}{key}/")
@@ -130,7 +131,7 @@ def _change(scene: Table, place: str, factor: float) -> None:
 
 
 def _mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
-    """Spoil a scene as users do; the engine that is asked for then."""
+    """Put a typical user's mistake into a scene; returns the engine to ask for, which may be the mistake."""
     before = copy.deepcopy(scene)
     places = sorted(_places_of_numbers(before))
     kind = int(random.integers(5))

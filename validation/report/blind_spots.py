@@ -13,7 +13,8 @@ SHOWN_IDS = 3
 
 
 def blind_spots(path: Path = KEPT) -> Saved:
-    """Lines of the kept table, counts by module, commits, and functions that are not covered, by what there is instead.
+    """Content of the report's page: lines of the saved table, counts by module, commits, and functions that no
+    independent check covers, by the reason.
 
     A compiled function that the sources share now and that has no line is not covered: it was not audited.
     """
@@ -43,7 +44,7 @@ def _function_record(audit_line: Line) -> Saved:
 
 
 def _modules(lines: list[Line]) -> list[tuple[str, int, int, int]]:
-    """Counts for each module: functions, those that something independent notices, those that anything does."""
+    """Counts for each module: functions, those covered by an independent check, and those covered by any check."""
     of: dict[str, list[Line]] = {}
     for line in lines:
         of.setdefault(line.function.partition(":")[0], []).append(line)

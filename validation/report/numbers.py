@@ -13,7 +13,8 @@ PLAIN = (1e-3, 1e5)
 
 
 def number(value: Any, digits: int = 4) -> Markup:
-    """A number with so many significant digits, as ``0.0123`` or ``8.9e-16``; text stays text, None a dash."""
+    """Text of a number with ``digits`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is, None
+    becomes a dash."""
     if value is None or value == "":
         return Markup("–")
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -28,26 +29,26 @@ def number(value: Any, digits: int = 4) -> Markup:
 
 
 def error(value: Any) -> Markup:
-    """An error or a tolerance: two significant digits say its size, four where it is written without a power of ten."""
+    """Text of an error or tolerance, with four significant digits in fixed notation, and two in powers of ten."""
     plain = isinstance(value, int | float) and PLAIN[0] <= abs(value) < PLAIN[1]
     return number(value, 4 if plain else 2)
 
 
 def _scientific(value: float, digits: int) -> str:
-    """``8.9e-16``: a power of ten without leading zeros."""
+    """Text in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
 
 
 def _significant(value: float, digits: int) -> str:
-    """Fixed notation with so many significant digits, without trailing zeros."""
+    """Text in fixed notation with ``digits`` significant digits, without trailing zeros."""
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if value else 0
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def margin(row: dict[str, Any]) -> float | None:
-    """|value - expected| over tolerance; None where a row has no tolerance or it is exactly zero."""
+    """Ratio of |value - expected| to the tolerance; None if there is no tolerance or it is zero."""
     value, expected, tolerance = row["value"], row["expected"], row["tolerance"]
     numeric = all(isinstance(x, int | float) and not isinstance(x, bool) for x in (value, expected, tolerance))
     if not numeric or tolerance <= 0:
@@ -56,7 +57,7 @@ def margin(row: dict[str, Any]) -> float | None:
 
 
 def share(value: float | None) -> Markup:
-    """A margin in per cent of its tolerance, or how many times over it is."""
+    """Text of a margin: per cent of the tolerance, or how many times it is exceeded."""
     if value is None or math.isnan(value):
         return Markup("–")
     if value > 10:
@@ -67,7 +68,7 @@ def share(value: float | None) -> Markup:
 
 
 def duration(seconds: float) -> str:
-    """Seconds, or minutes from two on."""
+    """Text of a duration: in seconds, or in minutes from two minutes on."""
     whole = round(seconds)
     return f"{seconds:.1f} s" if seconds < 10 else f"{whole} s" if whole < 120 else f"{round(whole / 60)} min"
 

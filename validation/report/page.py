@@ -62,13 +62,14 @@ def _source(provenance: Saved) -> list[tuple[str, str]]:
 
 
 def silent_systems(rows: list[Saved]) -> list[str]:
-    """Systems that have no row, or none that was run."""
+    """Systems without any row that was run."""
     run = {row["system"] for row in rows if row["status"] != "not run"}
     return [system for system in get_args(System) if system not in run]
 
 
 def systems(results: Saved, shown: dict[str, Saved]) -> list[Saved]:
-    """Rows by system and, within it, by case, in the order of the report; drawn : what is shown of each case."""
+    """Rows grouped by system and, within it, by case, in the order of the report; shown: tables and figures of each
+    case."""
     order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
     by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
     return [
@@ -96,8 +97,7 @@ def _cases(rows: list[Saved], seconds: dict[str, float], shown: dict[str, Saved]
 
 
 def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
-    """Number of rows of each case by the kind of their second side; drawn : the shown tables and figures of each case,
-    by name."""
+    """Number of rows of each case for each kind of independent second side; shown: tables and figures of each case."""
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
         kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
@@ -106,7 +106,8 @@ def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
 
 
 def evidence(rows: list[Saved]) -> list[tuple[str, list[int]]]:
-    """Per system, how many rows rest on which kind of second side, in the order of KINDS; rows that ran."""
+    """For each system, the number of rows with each kind of independent second side, in the order of KINDS; rows not
+    run are left out."""
     ran = [row for row in rows if row["status"] != "not run"]
     names = dict.fromkeys(row["system"] for row in ran)
     kinds = {name: [row["independence"] for row in ran if row["system"] == name] for name in names}
@@ -118,7 +119,7 @@ NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
 
 
 def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
-    """Assumptions that runs broke with leave, those of alike runs once, and the rows that rest on these runs."""
+    """Allowed broken assumptions, similar ones grouped, and the rows that rest on them."""
     alike_rows: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
         if row["allowed"]:
@@ -127,7 +128,7 @@ def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
 
 
 def conventions() -> list[tuple[str, str]]:
-    """Heading and text of every paragraph of the conventions page."""
+    """Heading and text of each paragraph on conventions of axes, signs and units."""
     import models
 
     pairs: list[tuple[str, str]] = []

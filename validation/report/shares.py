@@ -37,19 +37,20 @@ assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values())
 
 @cache
 def full() -> dict[str, Saved]:
-    """Shares of each case in the last full report: "rows" by system, "seconds", "commit"."""
+    """Data of each case in the last full report: number of rows by system, seconds, and commit."""
     kept: dict[str, Saved] = json.loads(KEPT_REPORT.read_text(encoding="utf-8"))
     return kept
 
 
 def case_of(row: Saved) -> str:
-    """Name of the case that a row belongs to: its id begins with it, or with a word of it."""
+    """Name of the case of a row: the row's id begins with it, or with a word that stands for it."""
     first = row["id"].partition(".")[0]
     return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
 
 
 def shares(results: Saved) -> list[Saved]:
-    """Cases, rows and seconds of each system that was measured, those of a full report, and the stated seconds.
+    """For each system, the numbers of cases and rows that were measured, those of a full report, and the stated
+    computing times.
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
     """
@@ -81,7 +82,7 @@ def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], s
 
 
 def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
-    """Rows of each case by system."""
+    """Number of rows for each case, by system."""
     counted: dict[str, Counter[str]] = {}
     for row in rows:
         counted.setdefault(case_of(row), Counter())[row["system"]] += 1
@@ -89,7 +90,7 @@ def _row_counts(rows: list[Saved]) -> dict[str, Counter[str]]:
 
 
 def keep(folder: Path) -> None:
-    """Keep what a full report had, case by case; raises InputError for the results of a quick one."""
+    """Save the number of rows and the seconds of each case of a full report; raises InputError for a quick report."""
     from validation.report.page import read
 
     results = read(folder / "results.json")

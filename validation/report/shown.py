@@ -23,7 +23,7 @@ LARGEST_SVG = 150_000
 
 
 def shown(folder: Path, name: str) -> Saved:
-    """Title, tables and figures of a case, what is said of it and of its share; "notes" tell what cannot be read.
+    """Title, tables and figures of a case, and texts on the case and its share; "notes" say what could not be read.
 
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
@@ -67,7 +67,7 @@ def _module(name: str) -> ModuleType | None:
 
 
 def _doc(documented: Any) -> str:
-    """The first paragraph of what is said of a module or a function."""
+    """First paragraph of the docstring of a module or function."""
     return "" if documented is None else (inspect.getdoc(documented) or "").partition("\n\n")[0]
 
 
@@ -81,7 +81,7 @@ def _figures(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
 
 
 def inline(figure: Any, caption: str, key: str) -> Markup:
-    """A figure as markup that needs nothing else; ``key`` keeps its identifiers apart from other figures'."""
+    """A figure as self-contained markup; ``key`` makes its identifiers differ from those of other figures."""
 
     vector = _svg(figure, caption, key)
     picture = vector if len(vector) <= LARGEST_SVG else _png(figure, caption)
@@ -89,7 +89,8 @@ def inline(figure: Any, caption: str, key: str) -> Markup:
 
 
 def _svg(figure: Any, caption: str, key: str) -> str:
-    """SVG element without prologue, metadata and superfluous digits; drawn once, where ``savefig`` draws twice."""
+    """SVG element without prologue, metadata and needless digits; the figure is drawn once, whereas ``savefig`` draws
+    it twice."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     buffer = io.StringIO()
@@ -104,7 +105,7 @@ def _svg(figure: Any, caption: str, key: str) -> str:
 
 
 def _shorter(path: re.Match[str]) -> str:
-    """Coordinates of a path with two decimals: a hundredth of a point."""
+    """Path of an SVG with coordinates rounded to a hundredth of a point."""
     rounded = re.sub(r"-?\d+\.\d+", lambda matched: f"{float(matched[0]):.2f}".rstrip("0").rstrip("."), path[0])
     return rounded.replace("\n", " ")
 

@@ -28,7 +28,7 @@ _loaded = cache(load_vehicle)
 
 @dataclass(frozen=True)
 class DrawnRide:
-    """One scene, its speed (m/s), the outputs that must stay right, and how right."""
+    """A random ride scene, its speed (m/s), the outputs that must stay accurate, and the tolerance."""
 
     scene: ReducedScene
     speed: float
@@ -38,31 +38,31 @@ class DrawnRide:
 
 @dataclass(frozen=True)
 class BentRide:
-    """One scene with bent springs, what must stay right, and how right."""
+    """A random ride scene with nonlinear springs, the outputs that must stay accurate, and the tolerance."""
 
     scene: ReducedScene
     quantities: tuple[str, ...]
     tolerance: float
 
     def opened(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
-        """The drawn ride as run in time, with so many copies."""
+        """The scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
         options = {"copies": copies, "lasting": LASTING, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 
 
 class Draw:
-    """Random numbers of a seed."""
+    """Generator of random numbers for a seed."""
 
     def __init__(self, seed: int | list[int]) -> None:
         self.random = np.random.default_rng(seed)
 
     def between(self, low: float, high: float) -> float:
-        """A number whose logarithm is as likely anywhere between these."""
+        """Random number between both limits, uniform in its logarithm."""
         return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
 
 def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> DrawnRide:
-    """The scene of a seed; tolerance from 0.5 to 10 % where none is given.
+    """The random linear scene of a seed; the tolerance is random from 0.5 to 10 % by default.
 
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
     else each of them in about half of the scenes, and soft at times.
@@ -88,7 +88,8 @@ def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle:
 
 
 def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> SpatialVehicle:
-    """Light wheels, firm dampers, damped tyres in three of five; a fore-aft bushing and a part on mounts at times."""
+    """Random variant of a vehicle: light wheels, firm dampers, damped tyres in three of five cases; sometimes a
+    fore-aft bush and a part on mounts."""
     rng, between, wheels = generator.random, generator.between, wheels_of(vehicle)
     light, firm = between(0.15, 1.2), between(0.5, 4.0)
     damping = between(30.0, 400.0) if rng.random() < 0.6 else 0.0
@@ -117,7 +118,7 @@ def _vehicle(vehicle: SpatialVehicle, generator: Draw, detailed: bool) -> Spatia
 
 
 def drawn_bent(number: int) -> BentRide:
-    """The scene of a number whose springs are bent."""
+    """The random scene with nonlinear springs for a number."""
     draw = Draw([SEED, number])
     name = BENT_VEHICLES[number % len(BENT_VEHICLES)]
     vehicle = load_vehicle(name)
@@ -129,7 +130,8 @@ def drawn_bent(number: int) -> BentRide:
 
 
 def _bent(spring: SpringDamper, generator: Draw) -> SpringDamper:
-    """A digressive damper that is harder in rebound, stops at both ends, and friction: each in most of the springs."""
+    """A spring made nonlinear: a digressive damper that is harder in rebound, two bump stops, and friction, each with
+    high probability."""
     c, rebound, digressive = spring.damping, generator.between(1.0, 2.5), generator.between(0.3, 1.0)
     curve = Curve(
         (-1.0, -0.2, 0.0, 0.2, 1.0),

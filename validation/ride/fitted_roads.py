@@ -28,7 +28,8 @@ DATA = {"belgian_block.crg": (None, None), COURSE: (100.0, 404.8), "Horstwalde.c
 
 
 def made(length: float) -> tuple[list[Row], dict[str, Any]]:
-    """A road made from the two filters, exactly at its stations, and fitted: the filters must come back."""
+    """Rows and data: a road is generated from the two filters of the model, and the fit must find these filters
+    again."""
     road, step = road_of_level(HALF_TRACK), 0.05
     noise = normal(SEED, 0, round(length / step), 2)
     mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
@@ -56,7 +57,7 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _first_order_samples(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
-    """Samples of a first-order process from unit noise, exact at the stations, stationary from the first on."""
+    """Samples of a stationary first-order process from unit noise, exact at the stations."""
     kept = math.exp(-f.corner * step)
     driven = noise * math.sqrt((1.0 - kept**2) * f.intensity / (2.0 * f.corner))
     driven[0] = noise[0] * math.sqrt(f.intensity / (2.0 * f.corner))
@@ -64,7 +65,7 @@ def _first_order_samples(f: ShapeFilter, noise: np.ndarray, step: float) -> np.n
 
 
 def measured() -> tuple[list[Row], list[dict[str, Any]]]:
-    """Rows: properties of measured roads, and what cannot be told from them."""
+    """Rows: properties of measured roads, and limits of what a fit can determine."""
     data = data_folder()
     if data is None:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
@@ -146,7 +147,8 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
 
 
 def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) -> tuple[str, Any]:
-    """Left the spectra over the wavenumber, right the coherency of left and right; measured roads thin."""
+    """Figure with spectra over the wavenumber (left) and coherency of both tracks (right); measured roads as thin
+    lines."""
     from models.drawing.figures import COLUMN_WIDTH, heading, subplots
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)

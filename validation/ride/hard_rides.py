@@ -26,12 +26,13 @@ BODY, UP = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
 
 
 def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
-    """The linear vehicle of an implementation."""
+    """The linear vehicle in an implementation."""
     return linear_vehicle(vehicle, implementation)(speed)
 
 
 def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
-    """A case of a quarter car with some of its values changed: acceleration and travel, relative."""
+    """Case: a quarter car with some values changed. Error: relative error of acceleration and travel against the closed
+    form."""
     exact = replace(QuarterCar(*CORNER), **car)
 
     def error(implementation: str, folder: Path) -> float:
@@ -56,7 +57,7 @@ def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float =
 
 
 def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
-    """A body on a tyre, held by a damper to the ground; outputs: its acceleration and its height."""
+    """A body on a tyre with a damper to the ground; outputs: acceleration and height of the body."""
     outputs = tuple(PointOutput(kind, kind, "body", BODY, UP) for kind in ("acceleration", "displacement"))
     damper = SpringDamper("damper", "body", None, BODY, BODY, UP, 0.0, damping)
     return SpatialVehicle(
@@ -71,7 +72,7 @@ def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
 
 @cache
 def steered() -> SpatialVehicle:
-    """R19-free with roll steer in front; outputs: its heading and its place sideways."""
+    """R19-free with roll steer at the front axle; outputs: heading and lateral position."""
     table = parse(SHIPPED / "r19_free.toml")
     table["axles"][0]["roll_steer"] = 0.05
     vehicle = build_vehicle(table, "steered")
@@ -83,7 +84,8 @@ def steered() -> SpatialVehicle:
 
 
 def after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (p,) 1 and 2 hours after rest, axles independent: a step of 3 ms by van Loan's block, then doubled."""
+    """Variances (p,) 1 and 2 hours after rest with independent axles, by a van Loan discretisation over 3 ms that is
+    doubled repeatedly."""
     n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
     block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
     E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]

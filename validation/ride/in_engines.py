@@ -34,13 +34,14 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 
 @cache
 def ride(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
-    """A shipped vehicle and a road of some times the paper's level, one without a width on one track."""
+    """A shipped vehicle and a road of ``level`` times the paper's; a vehicle without a track width has one track."""
     vehicle = replace(load_vehicle(name), gravity=gravity)
     return vehicle, paper_road(wheels(vehicle), level=level * LEVEL)
 
 
 def bent_in_engines(quick: bool) -> list[Row]:
-    """The nonlinear quarter car under gravity in both engines; its mean travel where the damper pulls it."""
+    """Rows: the nonlinear quarter car under gravity in both engines, and its mean travel, which the asymmetric damper
+    shifts."""
     vehicle, excitation_ = ride(NONLINEAR)
     road = road_path(excitation_, SPEED, NONLINEAR_STEP)
     runs = {
@@ -100,7 +101,8 @@ def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
 
 
 def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
-    """19 freedoms, gravity on, one path of the random road: variances and means against the covariance."""
+    """Rows: a vehicle with 19 freedoms under gravity on one random road; variances and means in both engines against
+    the covariance."""
     vehicle, excitation_ = ride("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
@@ -136,7 +138,8 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
 
 
 def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
-    """One-sided densities over Hz of shown outputs: the covariance's own, and each engine's by Welch's method."""
+    """One-sided spectral densities over Hz of some outputs: by the covariance's model, and by Welch's method for each
+    engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
     sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
     sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
@@ -150,7 +153,7 @@ def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitatio
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Spectra of both engines' runs over the covariance's own."""
+    """Plot spectra of both engines' runs over the model's own."""
     if not data["spectra"]:
         return []
     from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, heading, legend_below, subplots

@@ -20,7 +20,7 @@ CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 
 
 def weighting_rows(seed: int) -> list[Row]:
-    """Rows of the frequency-weighted seat accelerations of an asymmetric vehicle: by filter states, and by the
+    """Rows on frequency-weighted seat accelerations of an asymmetric vehicle: by filter states, compared with the
     frequency response."""
     vehicle = linearise(twin(load_vehicle("r19_ride"), seed))
     road, rows = paper_road(vehicle.wheels), []
@@ -42,12 +42,12 @@ def weighting_rows(seed: int) -> list[Row]:
 
 
 def without_variance() -> list[Row]:
-    """White noise in an output, places that walk, and a vehicle that is unstable."""
+    """Rows on outputs without a finite variance: white noise, diffusing positions, and an unstable vehicle."""
     return [*_white_rows(), *_free_rows(), _unstable_row()]
 
 
 def _white_rows() -> list[Row]:
-    """Tyre damping: what has no variance is said, with its reason, and what has one is right."""
+    """Rows on damped tyres: outputs without finite variance are reported with the reason, and the others are right."""
     vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
     covariance = stationary(excited(vehicle, one_track((0.0,), 0.3), 20.0))
     other = quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
@@ -79,7 +79,8 @@ def _white_rows() -> list[Row]:
 
 
 def _free_rows() -> list[Row]:
-    """Three zero eigenvalues: found, harmless, the same with slycot, and a heading that roll steer lets walk."""
+    """Rows on a free vehicle with three zero eigenvalues. They are found and do not spoil the variances, with slycot or
+    without; with roll steer the heading diffuses."""
     free = load_vehicle("r19_free")
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)
@@ -142,7 +143,7 @@ def _free_rows() -> list[Row]:
 
 
 def _with_slycot(system: DelayedSystem) -> np.ndarray:
-    """Variances where python-control believes that slycot is installed, with routines that cannot be called."""
+    """Variances if python-control believes that slycot is installed, but its routines fail when called."""
     import control.exception as installed
     import control.mateqn as solvers
 

@@ -70,12 +70,12 @@ STANDARD = (
 
 
 def off(values: ArrayLike, expected: ArrayLike) -> float:
-    """Largest relative error of values beside expected ones."""
+    """Largest relative error of values against expected ones."""
     return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
 
 
 def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
-    """One track under axles at ``places``, z' = -corner z + w."""
+    """One track under axles at positions ``places`` (m); its height obeys z' = -corner z + w with white noise w."""
     heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
     filter_ = np.array([[-corner]]), np.array([[INTENSITY**0.5]])
     return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
@@ -84,14 +84,15 @@ def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
 def paper_road(
     wheels: Sequence[WheelPosition], *words: str, level: float = LEVEL, cutoff: float | None = None
 ) -> Excitation:
-    """The paper's road under wheels, in words of a case; wheels without a width run on one track."""
+    """The paper's road under wheels, with a case of correlation in words; wheels without a track width have one
+    track."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
     return excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
 
 
 def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
-    """The paper's road, or another one, in the paper's five cases of correlation by their numbers."""
+    """The paper's road, or another one, in the paper's five cases of correlation, by their numbers."""
     road = road or road_of_level(half_track(wheels))
     return {str(number): excitation(road, wheels, *case) for number, case in CASES.items()}
 
@@ -99,7 +100,8 @@ def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None
 def corners(
     places: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
 ) -> LinearVehicle:
-    """Corners (x in m, quarter car), one per axle, under a body with the mass matrix of z or of z and pitch.
+    """Linear vehicle of quarter-car corners (x in m, quarter car), one per axle, under a body with a mass matrix of
+    heave, or of heave and pitch.
 
     tyre_damping in N s/m. Outputs: body acceleration; travel, tyre deflection, body height; load and acceleration of
     the first wheel.

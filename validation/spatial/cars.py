@@ -24,7 +24,7 @@ SEED = 31
 
 @cache
 def r19() -> CutVehicle:
-    """The shipped car, cut."""
+    """The shipped car, cut at its wheels."""
     return cut(load_vehicle("r19_free"), "body")
 
 
@@ -42,7 +42,7 @@ def twin() -> SpatialVehicle:
 
 @cache
 def rough_car() -> CutVehicle:
-    """The twin with stops, digressive dampers and dry friction in its suspension and mounts, cut.
+    """The twin, cut at its wheels, with bump stops, digressive dampers and dry friction in suspension and mounts.
 
     One wheel moves in all three directions, on a spring along none of them; one seat has no spring but a curve.
     """
@@ -65,14 +65,14 @@ def rough_car() -> CutVehicle:
 
 
 def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
-    """Hub forces that carry the vehicle at rest."""
+    """Hub forces (rows) that carry the vehicle at rest."""
     forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
     return HubInputs(forces, frame)
 
 
 def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates at random, the chassis turned by any heading and by up to a radian."""
+    """Random coordinates and rates, with the chassis at any heading and with roll and pitch up to 1 rad."""
     rng = np.random.default_rng(seed)
     q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
     q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
@@ -80,7 +80,7 @@ def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
-    """A row of six random components per hub, with a stabiliser or without."""
+    """Random forces and moments on every hub, with or without a prescribed attitude (``guide``)."""
     rng = np.random.default_rng(SEED)
     hub_inputs = static(vehicle, 3, frame)
     hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
@@ -88,7 +88,8 @@ def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
 
 
 def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
-    """Joint forces (n,) of wrenches (6 h,) at the hubs, in axes of these or "inertial" ones, by MuJoCo's Jacobians."""
+    """Generalised forces (n,) of wrenches (6 h,) at the hubs by MuJoCo's Jacobians; the wrenches are in the hubs' axes
+    or in "inertial" ones."""
     assert isinstance(hub_model.model, FreeMujoco)
     model, names = hub_model.model.model, [body.name for body in hub_model.vehicle.tree.bodies]
     data, forces = mujoco.MjData(model), np.zeros(hub_model.size)
@@ -103,7 +104,8 @@ def by_jacobians(hub_model: HubModel, q: np.ndarray, wrenches: np.ndarray, frame
 
 
 def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
-    """Largest error of a tyre's cornering stiffness at its static load, out of its table, by the ride vehicle's."""
+    """Largest relative error of a tyre's cornering stiffness at its static load, computed from the car's table, against
+    the ride vehicle's."""
     wanted, worst = {force.name: force.stiffness for force in handling.given.side_forces}, 0.0
     for i, tyre in enumerate(handling.vehicle.tyres):
         n = handling.tyre_numbers(i)
@@ -115,14 +117,14 @@ def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
 
 
 def mirrored(handling: Handling, values: np.ndarray) -> np.ndarray:
-    """Values (..., n) of the coordinates of a car as those of its mirror image, left and right exchanged."""
+    """Values (..., n) of a car's coordinates in its mirror image, with left and right exchanged."""
     places = handling.vehicle.coordinates()
     swap = [places.index((_opposite(name), freedom)) for name, freedom in places]
     return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places]) * values[..., swap]
 
 
 def _opposite(name: str) -> str:
-    """The body on the other side."""
+    """Name of the corresponding body on the other side of the car."""
     for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
         for side, opposite in ((left, right), (right, left)):
             if name.startswith(side):

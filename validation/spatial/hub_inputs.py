@@ -29,7 +29,7 @@ SYSTEM: System = "drift"
 
 
 def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
-    """Held forces in every engine, and integrators that pick their own steps, on a vehicle."""
+    """Rows on one vehicle: held forces in every engine, and adaptive integrators."""
     methods = QUICK if quick else METHODS
     names = " and ".join(methods)
     return [
@@ -68,19 +68,19 @@ def rows(vehicle: CutVehicle, quick: bool) -> list[Row]:
 
 
 def settings(integrator: str = FIXED) -> Settings:
-    """Of a run over all samples."""
+    """Settings of a run over all force samples."""
     return Settings(integrator, STEP, (SAMPLES - 1) * STEPS_PER_SAMPLE * STEP, SOLVER_TOLERANCE)
 
 
 def samples(vehicle: CutVehicle) -> HubForces:
-    """Static loads and 400 N, 40 N m at random, in the axes of space."""
+    """Hub force samples in axes fixed in space: static loads with random parts of 400 N and 40 N m."""
     rest = static(vehicle, SAMPLES, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
     return HubForces(rest.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
 
 def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator: str = FIXED) -> float:
-    """Largest error (m) of the centre of mass on any axis: at the samples, against the closed form."""
+    """Largest error (m) of the centre of mass at the sample times, against the closed form, over all axes."""
     forces, how = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
     moved = centres(vehicle, run.positions[::STEPS_PER_SAMPLE])
@@ -88,7 +88,7 @@ def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator:
 
 
 def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
-    """Centre of mass (m, 3) of all bodies at coordinates (m, n), m."""
+    """Centre of mass (m, 3) in m of all bodies at coordinates (m, n)."""
     bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
     points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
     places = [tree.move(q, 0.0 * q).at(points)[:, PLACE] for q in positions]
@@ -96,7 +96,8 @@ def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
 
 
 def _fallen(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
-    """Path (samples, 3) of a point of the vehicle's mass under its weight and the sum of all forces, from rest."""
+    """Path (samples, 3) of a point mass, with the vehicle's mass, under weight and the sum of all hub forces, from
+    rest."""
     mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
     hubs = forces.samples.reshape(SAMPLES, -1, WRENCH)[:, :, :3].sum(axis=1)
     begin = hubs[:-1] / mass - [0.0, 0.0, GRAVITY]
@@ -107,8 +108,8 @@ def _fallen(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.nd
 
 
 def instants_gap(vehicle: CutVehicle, count: int) -> float:
-    """Relative difference of the compiled accelerations from the plain ones at random states and times, of hub forces
-    and guides at random, read between their rows."""
+    """Relative difference between compiled and plain accelerations at random states and times, with random hub forces
+    and guides that are interpolated between their rows."""
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
     for i in range(count):
         hubs = static(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
@@ -123,8 +124,8 @@ def instants_gap(vehicle: CutVehicle, count: int) -> float:
 
 
 def path_gap(vehicle: CutVehicle, engine: str, integrator: str) -> float:
-    """Largest difference of any coordinate or rate of a run by an integrator that picks its own steps from Runge-Kutta
-    4 in an eighth of the step, of forces that are linear between their samples."""
+    """Largest difference of any coordinate or rate between a run by an adaptive integrator and one by Runge-Kutta 4
+    with an eighth of the step; forces are linear between their samples."""
     forces, how = samples(vehicle), settings(integrator)
     fine = Settings(FIXED, STEP / 8.0, how.duration)
     hub_inputs, finer = (forces.hub_inputs(each.step, each.steps) for each in (how, fine))

@@ -23,7 +23,8 @@ SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 
 
 def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """Force and moment (guides, 6) on every guided body in its own axes, at coordinates and rates (n,).
+    """Force and moment (guides, 6) that MuJoCo's sensors measure on each guided body, in its own axes, at coordinates
+    and rates (n,).
 
     wrenches (h, 6) : at the hubs, in the axes of what they carry.
     """
@@ -31,8 +32,8 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 
 
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """Forces and moments of guides (guides, 6) from Exudyn's constraints in the axes of what carries each body, at
-    rest; exact where at most one angle is free."""
+    """Forces and moments (guides, 6) of guides at rest, from Exudyn's constraints, in the axes of the carrying body;
+    exact if at most one angle is free."""
     import exudyn as exu
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
@@ -78,7 +79,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
 
 
 class _Loaded:
-    """A MuJoCo model of a cut vehicle with loads on its bodies, at a state."""
+    """MuJoCo's model of a cut vehicle at a state, with loads on its bodies."""
 
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
         self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
@@ -99,7 +100,7 @@ class _Loaded:
             mujoco.mj_forward(self.model, self.data)
 
     def _point(self, body: str, design: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Place and velocity of a point of a body."""
+        """Position and velocity in space of a point fixed to a body."""
         number, jacobian = self.ids[body], np.zeros((3, self.model.nv))
         arm = design - np.array(self.vehicle.tree.body(body).position)
         place = self.data.xpos[number] + self.data.xmat[number].reshape(3, 3) @ arm
@@ -107,7 +108,7 @@ class _Loaded:
         return place, jacobian @ self.data.qvel
 
     def _add(self, body: str, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> None:
-        """A force at a place and a moment, in space."""
+        """Add a force at a point and a moment, both in space, to a body."""
         number = self.ids[body]
         self.data.xfrc_applied[number, :3] += force
         self.data.xfrc_applied[number, 3:] += moment + np.cross(point - self.data.xpos[number], force)
@@ -119,7 +120,7 @@ class _Loaded:
             self._add(tyre.body, place, turn @ wrench[:3], turn @ wrench[3:])
 
     def _load_elements(self) -> None:
-        """Springs, mounts and bars; d' is beside the turning chassis."""
+        """Apply the forces of springs, mounts and bars; travel rates are relative to the rotating chassis."""
         chassis, spin = self.ids[self.vehicle.chassis], np.zeros(6)
         turn = self.data.xmat[chassis].reshape(3, 3)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, chassis, spin, 0)

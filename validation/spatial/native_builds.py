@@ -17,7 +17,8 @@ State = tuple[np.ndarray, np.ndarray]
 
 
 def random_states(vehicle: CutVehicle, count: int) -> list[State]:
-    """Coordinates and rates (n,): any heading, roll and pitch to 0.3 rad, other turns to 0.05 rad, slides to 0.08 m."""
+    """Random coordinates and rates (n,): any heading, roll and pitch up to 0.3 rad, other rotations up to 0.05 rad,
+    slides up to 0.08 m."""
     rng, turns = np.random.default_rng(SEED), np.array([f.startswith("r") for _, f in vehicle.tree.coordinates()])
     most = np.where(turns, 0.05, 0.08)
     most[:6] = 5.0, 5.0, 5.0, np.pi, 0.3, 0.3
@@ -26,18 +27,19 @@ def random_states(vehicle: CutVehicle, count: int) -> list[State]:
 
 
 def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
-    """Static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
+    """Input of static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
     rest = static(vehicle, rows)
     return replace(rest, hubs=rest.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, rest.hubs.shape))
 
 
 def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
-    """The vehicle on its shaken hubs in an engine."""
+    """The vehicle with random hub forces in an engine, built natively or with compiled forces (``route``)."""
     return build(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 
 
 def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
-    """Largest difference of a native build's accelerations from compiled forces, by each coordinate's largest."""
+    """Largest difference between accelerations of a native build and by compiled forces, relative to each coordinate's
+    largest."""
     native, compiled = model(engine, vehicle, "native"), model("mujoco", vehicle, "compiled")
     return _difference([[each.acceleration(0.0, *state) for state in states] for each in (native, compiled)])
 
@@ -55,7 +57,8 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
 
 
 def written(vehicle: CutVehicle) -> SpatialReference:
-    """Equations of a cut vehicle without hub forces: its tree with springs and bars, preloads and weight."""
+    """Hand-written equations of a cut vehicle without hub forces: bodies with springs, anti-roll bars, preloads and
+    weight."""
     whole = vehicle.uncut
     equations = SpatialReference(replace(vehicle.tree, springs=whole.springs, bars=whole.bars, gravity=0.0))
     equations.vehicle = replace(equations.vehicle, gravity=GRAVITY)
@@ -64,7 +67,7 @@ def written(vehicle: CutVehicle) -> SpatialReference:
 
 
 def path_error(engine: str, vehicle: CutVehicle, steps: int) -> float:
-    """Largest difference (m, rad, m/s, rad/s) of a native run's states from one by compiled forces."""
+    """Largest difference (m, rad, m/s, rad/s) between the states of a native run and of one with compiled forces."""
     native = model(engine, vehicle, "native", steps).run()
     compiled = model("mujoco", vehicle, "compiled", steps).run()
     return float(np.abs(native.states - compiled.states).max())

@@ -13,7 +13,8 @@ Places = dict[str, tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class Path:
-    """alpha, rates (n, 3) local; orientation (n, 4); acceleration, position (n, 3) global; start; period (s)."""
+    """Motion of a rigid body. alpha, rates (n, 3): angular acceleration and velocity, local; orientation (n, 4);
+    acceleration, position (n, 3) of the reference point, global; start; period (s)."""
 
     alpha: np.ndarray
     rates: np.ndarray
@@ -25,7 +26,8 @@ class Path:
 
 
 def path(count: int = 2001, period: float = 1e-3) -> Path:
-    """Roll, pitch and yaw of some tenths of a radian at different frequencies, and a reference point that moves.
+    """Motion with roll, pitch and yaw of some tenths of a radian at different frequencies, and a moving reference
+    point.
 
     Rates follow from the Cardan angles by the closed form w = E(roll, pitch) (roll', pitch', yaw'), and alpha by its
     derivative: nothing of the algorithm under test is used.
@@ -56,7 +58,7 @@ def path(count: int = 2001, period: float = 1e-3) -> Path:
 
 
 def _waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sine waves (n, 3) of amplitude, angular frequency and phase, a row each, with two derivatives."""
+    """Sine waves (n, 3) and their first two derivatives; shapes: rows of amplitude, angular frequency and phase."""
     size, speed, phase = shapes.T
     angle = np.outer(t, speed) + phase
     return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
@@ -66,14 +68,16 @@ PATH = path()
 
 
 def readings(places: np.ndarray, motion: Path = PATH) -> np.ndarray:
-    """Specific forces (n, sensors, 3) in m/s^2 at local places (sensors, 3) in m, by eqs (16) and (17)."""
+    """Specific forces (n, sensors, 3) in m/s^2 that sensors at local positions (sensors, 3) in m read, by eqs (16) and
+    (17)."""
     lever = skew(motion.alpha) + skew(motion.rates) @ skew(motion.rates)
     felt = np.einsum("nji,nj->ni", matrix(motion.orientation), motion.acceleration - GRAVITY)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 
 
 def tilted(height: float, turn: np.ndarray) -> Places:
-    """Four sensors at the corners of a floor of 2 m by 1.2 m and a fifth above its middle, turned and moved."""
+    """Positions of five sensors, rotated and shifted: four at the corners of a floor of 2 m by 1.2 m, and one above its
+    middle."""
     floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
     return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ turn.T)}
 

@@ -32,7 +32,7 @@ SKEW = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
 
 
 def vehicle(gravity: float = 0.0) -> SpatialVehicle:
-    """The twin, unloaded or under a gravity (m/s^2)."""
+    """The asymmetric twin, without gravity or under a gravity (m/s^2)."""
     return SpatialVehicle(
         "spatial twin",
         _bodies(),
@@ -66,7 +66,7 @@ def _spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k:
 
 
 def _springs() -> tuple[SpringDamper, ...]:
-    """Suspensions first, then the mounts along three skew axes that are at right angles, then the riders'."""
+    """Springs of the twin: suspensions; then mounts along three orthogonal skew axes; then seats."""
     suspensions = (
         _spring("spring fl", "body", "fl", FRONT_LEFT, STEEP_AXIS, 2.0e4, 1500.0),
         _spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP_AXIS, 2.2e4, 1400.0),

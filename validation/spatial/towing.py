@@ -20,15 +20,15 @@ SMALL_STEER = 2e-5
 
 @dataclass(frozen=True)
 class TurnErrors:
-    """A settled turn beside its closed form: yaw gain over the form's, less 1; headings of the towed bodies beside the
-    car, less the form's (rad per rad of steer)."""
+    """Errors of a steady turn against its closed form. yaw : relative error of the yaw gain; headings : errors of the
+    towed bodies' angles relative to the car (rad per rad of steer)."""
 
     yaw: float
     headings: np.ndarray
 
 
 def levers_error() -> float:
-    """Largest relative error of the caravan's hitch load and of all axle loads against the balance of moments."""
+    """Largest relative error of the caravan's hitch load and of all axle loads, against the balance of moments."""
     car = Handling(caravan())
     free, (towed,) = car.vehicle, car.vehicle.towed
     loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
@@ -37,7 +37,7 @@ def levers_error() -> float:
 
 
 def levers(car: Handling) -> list[float]:
-    """Loads (N) of a car's front and rear axle, of its caravan's axle and of the ball, by levers.
+    """Loads (N) of a car's front and rear axle, of the caravan's axle and of the ball, by the balance of moments.
 
     About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
     """
@@ -57,7 +57,7 @@ def levers(car: Handling) -> list[float]:
 def towed_turn(
     vehicle: SpatialVehicle, speed: float, change: Callable[[Handling], None] | None = None, duration: float = 8.0
 ) -> TurnErrors:
-    """Turns of small slip at a speed (m/s) in MuJoCo, beside their closed form.
+    """Errors of turns with small slip at a speed (m/s) in MuJoCo, against their closed form.
 
     One to the left less one to the right: a vehicle without symmetry pulls. change : plants a fault in the table;
     duration : s.
@@ -75,7 +75,8 @@ def towed_turn(
 
 
 def headings(drive: Drive) -> list[float]:
-    """Last heading (rad) of every towed body beside the car: its own yaw, and those of all between both."""
+    """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of all hitches between
+    them."""
     free = drive.handling.vehicle
     yaws = {
         name: float(drive.run.positions[-1, free.coordinates().index((hitch_of(name), "rz"))]) for name in free.towed
@@ -84,8 +85,8 @@ def headings(drive: Drive) -> list[float]:
 
 
 def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
-    """Angle of the shipped caravan beside the car at a walking pace, over that of wheels that roll where they head,
-    less 1.
+    """Relative error of the angle between caravan and car in a slow turn, against that of wheels that roll without side
+    slip.
 
     A rear axle at a wheelbase L behind one that is steered by delta rolls on a circle of R = L / tan(delta); the ball,
     e behind it, on one of sqrt(R^2 + e^2), and the caravan's axle, l behind the ball, touches its own circle.
@@ -100,6 +101,6 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
 
 
 def keep_to_the_car(car: Handling) -> None:
-    """Plant a fault: wheels of towed bodies keep to the heading of the car."""
+    """Plant a fault: wheels of towed bodies have the car's heading."""
     for i in range(len(car.vehicle.tyres)):
         car.tyre_numbers(i)[at.TOWED] = 0.0

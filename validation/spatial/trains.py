@@ -37,9 +37,9 @@ def caravan() -> SpatialVehicle:
 
 
 def train() -> SpatialVehicle:
-    """The asymmetric twin of the car with a trailer of two axles: its drawbar, which has the first, yaws and pitches
-    about the hook, and the box yaws on the drawbar. Springs have curves and friction, and lie along no axis of it; one
-    ties the drawbar to the car, beside the hook."""
+    """The asymmetric twin with a trailer of two axles. The drawbar, with the first axle, yaws and pitches about the
+    hook, and the box yaws on the drawbar. Springs have curves, friction and skew axes; one connects drawbar and car
+    beside the hook."""
     car = twin()
     tyres = tuple(Tyre(name, name, place, 2 + (of == BOX), 2.1e5) for name, (of, place, _, _) in WHEELS.items())
     sides = tuple(SideForce(name, of, (x, y, 0.0), of, 4.2e4) for name, (of, (x, y, _), _, _) in WHEELS.items())
@@ -58,7 +58,8 @@ def train() -> SpatialVehicle:
 
 
 def train_without_tie() -> SpatialVehicle:
-    """The train without the tie, whose box pitches on the drawbar, too: no moment crosses a hitch.
+    """The same train without this connecting spring, and with a box that also pitches on the drawbar, so that no hitch
+    transmits a moment.
 
     Closed forms of a turn know none. A box that cannot pitch beside a drawbar that rolls with the car yaws by its
     weight: its axis leans.
@@ -69,7 +70,7 @@ def train_without_tie() -> SpatialVehicle:
 
 
 def _bodies() -> tuple[Body, ...]:
-    """The drawbar and the box behind their hitches, and the wheels."""
+    """Bodies of the trailer: drawbar and box behind their hitches, and wheels."""
     inertia = ((260.0, 6.0, -9.0), (6.0, 700.0, 4.0), (-9.0, 4.0, 720.0))
     light = ((20.0, 0.0, 1.0), (0.0, 60.0, 0.0), (1.0, 0.0, 65.0))
     return (
@@ -82,7 +83,7 @@ def _bodies() -> tuple[Body, ...]:
 
 
 def _springs() -> tuple[SpringDamper, ...]:
-    """Springs of the trailer's wheels, whose axes are fixed in what carries them."""
+    """Springs of the trailer's wheels, with axes fixed in the body that carries them."""
     up: Vector = (0.06, 0.0, 0.9981984772580131)
     dampers = {"dl": DAMPER, "br": DAMPER}
     upright = tuple(

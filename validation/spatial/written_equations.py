@@ -48,7 +48,7 @@ TURN = Controls(
 
 
 def curved() -> SpatialVehicle:
-    """R19-free with a bump stop, a bent damper and dry friction in each of its first springs."""
+    """R19-free with a bump stop, a nonlinear damper and dry friction in each of its first springs."""
     car = load_vehicle("r19_free")
     first = (replace(s, travel_force=BUMP, rate_force=DAMPER, friction=120.0) for s in car.springs[:4])
     return replace(car, springs=(*first, *car.springs[4:]))
@@ -69,7 +69,8 @@ def rolling_cars() -> dict[str, Handling]:
 
 
 def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Times (s), positions and rates (n,) at random: any heading, leaning, at speeds from standing to 25 m/s."""
+    """Random times (s), coordinates and rates (n,): any heading, rolled and pitched, at speeds from standing to 25
+    m/s."""
     rng, places = np.random.default_rng(SEED), car.vehicle.coordinates()
     towing = ("sway", *map(hitch_of, car.vehicle.towed))
     leans = [i for i, (name, freedom) in enumerate(places) if name in towing and freedom in ("rx", "ry")]
@@ -86,7 +87,8 @@ def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarra
 
 
 def rolling_gap(car: Handling, engine: str, count: int) -> float:
-    """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
+    """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
+    the state."""
     plain, model = build(REFERENCE, car), build(engine, car)
     states = rolling_states(car, count)
     return max(
@@ -95,7 +97,8 @@ def rolling_gap(car: Handling, engine: str, count: int) -> float:
 
 
 def report_gap(car: Handling, count: int) -> float:
-    """Largest difference of the tyres' reports and ledgers, each column by its largest value."""
+    """Largest difference of the tyre reports and energy ledgers from the plain equations, each column divided by its
+    largest value."""
     plain, numbers, worst = PlainRolling(car), car.numbers, 0.0
     states = list(rolling_states(car, count))
     times, q, v = (np.array(column) for column in zip(*states, strict=True))
@@ -109,19 +112,20 @@ def report_gap(car: Handling, count: int) -> float:
 
 
 def rolling_path_gap(car: Handling, engine: str, duration: float) -> float:
-    """Largest difference of positions and rates along a run."""
+    """Largest difference of coordinates and rates from the plain equations along a run."""
     settings = Settings("RK4", ROLLING_STEP, duration)
     ours, theirs = (build(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE))
     return float(max(np.abs(ours.positions - theirs.positions).max(), np.abs(ours.rates - theirs.rates).max()))
 
 
 def cut_cars() -> dict[str, CutVehicle]:
-    """Cut at their wheels: as shipped, and without symmetry, its tyres such that they only push."""
+    """Cars cut at their wheels: as shipped, and without symmetry with tyres that can lift off."""
     return {"r19_free": cut(load_vehicle("r19_free"), "body"), "twin": cut(twin().with_tyres(pushes_only=True), "body")}
 
 
 def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
-    """Six components at every hub in each frame, with no guide, pulled and enforced; and a road."""
+    """Inputs for comparison: random hub forces and moments in each frame, without guide, with a pulling and with a
+    prescribing guide; and a road."""
     rng, rows = np.random.default_rng(SEED), static(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
@@ -131,7 +135,7 @@ def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
 
 
 def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates (n,) at random: any heading, leaning by TILT, its tyres about the road."""
+    """Random coordinates and rates (n,): any heading, roll and pitch by TILT, tyres near the road."""
     q, v = anywhere(vehicle, seed)
     q[Z] *= 2e-3
     q[PITCH], q[ROLL] = TILT * q[PITCH], TILT * q[ROLL]
@@ -139,7 +143,8 @@ def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
-    """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
+    """Largest difference between the accelerations of an engine and of the plain equations, divided by the largest of
+    the state."""
     worst, input_sets = 0.0, hub_input_sets(vehicle)
     for i, hub_inputs in enumerate(input_sets):
         models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in (engine, PLAIN)]
@@ -151,7 +156,8 @@ def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
 
 
 def inside_gap(vehicle: CutVehicle, count: int) -> float:
-    """Largest difference of section forces, hub wrenches and holding moments, each by its largest value."""
+    """Largest difference of section forces, hub wrenches and stabilising moments from the plain equations, each divided
+    by its largest value."""
     worst = 0.0
     for hub_inputs in hub_input_sets(vehicle):
         models = [hub_model(name, vehicle, hub_inputs, STEP, STEP) for name in ("reference", PLAIN)]
@@ -164,7 +170,8 @@ def inside_gap(vehicle: CutVehicle, count: int) -> float:
 
 
 def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool) -> float:
-    """Largest difference of coordinates and rates along a run on a rough road, or on noisy forces in the hubs' axes."""
+    """Largest difference of coordinates and rates from the plain equations along a run, on a rough road or with noisy
+    hub forces."""
     steps = round(duration / STEP)
     if rough:
         left, right = (iso8608_road("C", seed) for seed in (1, 2))
@@ -179,7 +186,8 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool)
 
 
 def bristles_gap(count: int) -> float:
-    """Largest difference of creep forces by the load and of moments by load times half width, of random patches."""
+    """Largest difference of creep forces and moments of random brush contact patches from plain code; forces are
+    divided by the load, moments by load times half width."""
     rng, worst, width = np.random.default_rng(SEED), 0.0, 0.09
     for i in range(count):
         load, mu, half = rng.uniform(50.0, 8000.0), rng.uniform(0.1, 1.2), rng.uniform(0.02, 0.12)

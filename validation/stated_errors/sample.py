@@ -11,8 +11,9 @@ from models.core.errors import InputError, RunFailed
 
 @dataclass(frozen=True)
 class Sample:
-    """name : of the scene, with what was drawn; told : what the result says, by channel, empty where it says why there
-    is no number; true : root mean square of the difference from the truth, by the same channels and units.
+    """One test of a stated error. name : scene with its random values; told : errors that the result states, by
+    channel, empty where it states none; true : root mean square error against the truth, for the same channels and
+    units.
 
     calls, extra : force evaluations (cells, frequencies) of the run and of its estimate.
     """
@@ -31,14 +32,15 @@ class Sample:
 
     @property
     def ratio(self) -> float:
-        """True error by the stated one, of the printed channel."""
+        """Ratio of the true to the stated error of the printed channel."""
         return self.true[self.printed] / self.told[self.printed].error
 
 
 def drawn(
     count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
 ) -> Iterator[Sample]:
-    """So many samples; ``draw`` is asked anew where a scene is refused, a run fails, or nothing comes of it."""
+    """Samples from ``draw``, ``count`` of them; it is called again where a scene is refused, a run fails, or it gives
+    nothing."""
     random, made = np.random.default_rng(seed), 0
     while made < count:
         try:

@@ -22,7 +22,8 @@ LEAST_ECCENTRICITY = 1e-12
 
 
 class Touch(NamedTuple):
-    """Penetration (m), normal into the rail, place from the wheelset's centre (m), curvature along the track (1/m)."""
+    """Contact geometry: penetration (m), normal into the rail, position relative to the wheelset's centre (m),
+    curvature along the track (1/m)."""
 
     depth: float
     normal: np.ndarray
@@ -31,8 +32,8 @@ class Touch(NamedTuple):
 
 
 class PlainAxle(NamedTuple):
-    """Motion of the wheelset: its centre from the middle of the track (m), velocity with that of travel (m/s), unit
-    vectors along the axle and horizontally ahead, angular velocity, spin included (rad/s)."""
+    """Motion of the wheelset: position of its centre from the middle of the track (m), velocity including travel (m/s),
+    unit vectors along the axle and horizontally forward, and angular velocity including spin (rad/s)."""
 
     centre: np.ndarray
     velocity: np.ndarray
@@ -42,7 +43,8 @@ class PlainAxle(NamedTuple):
 
 
 class PatchForces(NamedTuple):
-    """Force (N) of a contact on the wheelset, moment about its centre (N m), and what the contact reports by name."""
+    """Force (N) of a contact on the wheelset, its moment about the wheelset's centre (N m), and reported quantities by
+    name."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -50,7 +52,7 @@ class PatchForces(NamedTuple):
 
 
 def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
-    """Vectors of a state (10,) of ``models.rail.equations``."""
+    """Motion of the wheelset for a state (10,) of ``models.rail.equations``."""
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     axle = np.cos(roll) * np.array([-np.sin(yaw), np.cos(yaw), 0.0]) + np.array([0.0, 0.0, np.sin(roll)])
@@ -60,7 +62,7 @@ def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
 
 
 def touch(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
-    """Where a cone touches its rail; side : 1 right, -1 left.
+    """Contact of a conical wheel with its rail; side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
     The generator of that plane runs from the apex; the place is where it crosses the head's axis as seen along n.
@@ -114,7 +116,7 @@ def creeping(
 
 
 def patch(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
-    """What one rail does to the wheelset."""
+    """Force and moment of one rail on the wheelset."""
     w, speed, at = wheelset, axle.velocity[0], touch(wheelset, side, axle)
     across = np.cross(at.normal, np.array([1.0, 0.0, 0.0]))
     velocity = axle.velocity + np.cross(axle.turning, at.place)
@@ -139,7 +141,7 @@ def patch(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int
 
 
 class PlainWheelset:
-    """A wheelset at a speed (m/s) with a law of creep forces; the weight leans to the right by ``lean``."""
+    """A wheelset at a speed (m/s) with a creep law; gravity is tilted to the right by ``lean``."""
 
     def __init__(self, wheelset: Wheelset, speed: float, law: str, cells: int = 21, lean: float = 0.0) -> None:
         self.wheelset, self.speed, self.law, self.cells, self.lean = wheelset, speed, law, cells, lean
@@ -152,7 +154,7 @@ class PlainWheelset:
         self.sunk = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
 
     def patches(self, state: np.ndarray) -> list[PatchForces]:
-        """Both rails' forces at a state (10,), right first."""
+        """Contact forces of both rails for a state (10,), right rail first."""
         axle = axle_of(state, self.speed)
         return [patch(self.wheelset, side, axle, self.law, self.cells) for side in (1.0, -1.0)]
 
@@ -176,7 +178,8 @@ class PlainWheelset:
         return force, moment
 
     def rates(self, state: np.ndarray) -> np.ndarray:
-        """Rates (10,) of a state (10,): dp/dt = F and dL/dt + W x L = M in axes that turn with W, not with the spin."""
+        """Time derivatives (10,) of a state (10,): dp/dt = F and dL/dt + W x L = M, in axes that rotate with W but
+        without the spin."""
         w, axle = self.wheelset, axle_of(state, self.speed)
         roll, (roll_rate, yaw_rate, spin) = state[2], state[7:]
         sums = [by_rails + held for by_rails, held in zip(self.by_rails(state), self.by_suspension(state), strict=True)]
@@ -195,7 +198,8 @@ class PlainWheelset:
         return np.array([*moved, acceleration[1], acceleration[2], gained[0], yawing, gained[1]])
 
     def on_joints(self, state: np.ndarray) -> np.ndarray:
-        """Both rails' forces on the joints (5,): y, z, yaw, roll, spin about the axle (N, N m), by virtual work."""
+        """Generalised forces (5,) of both rails on y, z, yaw, roll and spin about the axle (N, N m), by virtual
+        work."""
         axle, (force, moment) = axle_of(state, self.speed), self.by_rails(state)
         return np.array([force[1], force[2], moment[2], moment @ axle.ahead, moment @ axle.axle])
 

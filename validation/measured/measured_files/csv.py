@@ -30,23 +30,23 @@ def csv_rows(separator: str = ",", end: str = "\n") -> list[str]:
 
 
 def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "utf-8") -> Make:
-    """Make a file of a header and rows."""
+    """A CSV file made of a header and rows."""
     return raw((header + "\n" + "".join(csv_rows() if body is None else body)).encode(encoding))
 
 
 def changed_rows(index: int, row: str) -> list[str]:
-    """The rows with one of them changed."""
+    """The rows of the usual file with one row changed."""
     return [*csv_rows()[:index], row + "\n", *csv_rows()[index + 1 :]]
 
 
 def folder_of_that_name(folder: Path) -> Path:
-    """Make a folder called like a file."""
+    """Make a folder whose name looks like a CSV file's."""
     (folder / "odd.csv").mkdir()
     return folder / "odd.csv"
 
 
 def holes() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Truth with nothing measured for ten samples of one channel."""
+    """Expected values with ten samples missing in one channel."""
     values = FZ.copy()
     values[10:20] = np.nan
     return usual(Fz=values)

@@ -64,7 +64,7 @@ class Form:
 
 
 def stamps(written: Callable[[datetime], str], began: datetime = BEGAN) -> tuple[str, ...]:
-    """Time stamps (date and time of day) in a given notation."""
+    """Function that writes the time of a sample as date and time of day in a given notation."""
     return tuple(written(began + timedelta(milliseconds=10 * i)) for i in range(len(TIMES)))
 
 

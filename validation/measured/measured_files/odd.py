@@ -42,13 +42,13 @@ MEMORY, SECONDS = 5e7, 10.0
 
 
 def usual(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Truth of the two channels of the usual file; another series under its name."""
+    """Expected times and values of the two channels of the usual file, or other values under a channel's name."""
     return {name: (TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
 
 
 @dataclass(frozen=True)
 class OddFile:
-    """One file.
+    """An unusual or damaged file, and what reading it should give.
 
     make : writes it into a folder and returns its path. wanted, says : what must become of it, and a phrase of the
     refusal or of what is noticed. truth : channel -> times and values; a named file may give the first of them.
@@ -64,9 +64,9 @@ class OddFile:
     greedy: bool = False
 
     def error(self, folder: Path) -> float:
-        """Largest difference to the truth, inf where something is missing, or the reader's refusal; AssertionError
-        where a refusal says too little, the file was changed, or took more than it may.
-        """
+        """Largest difference of the values read from the expected ones; infinite if a channel or sample is missing. The
+        reader's refusal passes through. Raises AssertionError where a refusal does not name the reason, the folder was
+        changed, or reading took too much time or memory."""
         folder.mkdir(parents=True, exist_ok=True)
         path = self.make(folder)
         before = _state(folder)
@@ -81,7 +81,7 @@ class OddFile:
                 raise AssertionError(f"{self.name}: something was written beside {path} or into it")
 
     def _measured(self, path: Path) -> float:
-        """Error of what is read, within the memory and the time of a small file."""
+        """Error of the values read, with a check that time and memory are those of a small file."""
         if not self.greedy:
             return difference(open_source(path), self.truth, self.says if self.wanted == "named" else "")
         tracemalloc.start()
@@ -98,7 +98,8 @@ class OddFile:
 def every(
     refused: Files | None = None, named: Files | None = None, right: Files | None = None, greedy: Sequence[str] = ()
 ) -> tuple[OddFile, ...]:
-    """All files of these tables; greedy : names of those that claim a size that must not be taken."""
+    """All files of these three tables; greedy : names of files that claim a huge size, for which no memory may be
+    allocated."""
     tables: tuple[tuple[Wanted, Files], ...] = (
         ("refused", refused or {}),
         ("named", named or {}),
@@ -113,7 +114,7 @@ def every(
 
 
 def _state(folder: Path) -> dict[str, str]:
-    """Digest of every file below a folder."""
+    """Digest of all files below a folder, to see whether any of them changed."""
     return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
@@ -130,7 +131,8 @@ def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def difference(source: Source, truth: Truth, says: str) -> float:
-    """Largest difference between a file and the truth; inf where a channel, a sample or the sentence is missing."""
+    """Largest difference between a file and the expected values; infinite if a channel, a sample or the reader's
+    message is missing."""
     channels, said = read(source), [finding.text for finding in source.noticed if finding.weight != "note" or says]
     if set(channels) != set(truth) or not (any(says in text for text in said) if says else not said):
         return np.inf
@@ -140,7 +142,7 @@ def difference(source: Source, truth: Truth, says: str) -> float:
 def _largest_difference(
     read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], partial_allowed: bool
 ) -> float:
-    """Largest difference of times and values; a part of the samples will do where that was said."""
+    """Largest difference of times and values. With ``partial_allowed`` the first samples alone may have been read."""
     count = len(read_channel[0])
     if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not partial_allowed):
         return np.inf
@@ -151,7 +153,7 @@ def _largest_difference(
 
 
 def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
-    """Write the usual file, or other channels, in the format of the extension of ``path``."""
+    """Write channels (by default those of the usual file) in the format that the extension of ``path`` names."""
     table = np.column_stack((FZ, FX)) if values is None else values
     group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), PERIOD, len(table), [table])
     return write(path, [group])
@@ -179,7 +181,7 @@ def wide(extension: str) -> Make:
 
 
 def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
-    """Make a file with other bytes, or under another name, too."""
+    """Function that makes a file with changed bytes or another name."""
 
     def altered_file(folder: Path) -> Path:
         path = make_file(folder)
@@ -190,7 +192,7 @@ def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -
 
 
 def patched(data: bytes, byte_offset: int, new: bytes) -> bytes:
-    """Bytes of a file, some of them replaced."""
+    """Bytes of a file, in which ``new`` replaces those from an offset on."""
     return data[:byte_offset] + new + data[byte_offset + len(new) :]
 
 
@@ -214,7 +216,8 @@ def called(extension: str, name: str) -> Make:
 
 @dataclass(frozen=True)
 class CutSweep:
-    """A file of one format cut off at many places: refused, or the rest read right and named.
+    """A file cut off at many places. Each must be refused, or its remaining samples must be read right and reported as
+    incomplete.
 
     cuts : number of places, spread evenly over the file; 0 for every byte.
     """
@@ -223,7 +226,7 @@ class CutSweep:
     cuts: int = 40
 
     def silent(self, folder: Path) -> int:
-        """Cuts after which something is read that is not right or not said."""
+        """Number of cuts after which wrong values are read, or the cut is not reported."""
         folder.mkdir(parents=True, exist_ok=True)
         count = 7000 if self.extension == ".rsp" else COUNT  # three groups of RPC III and a half
         table = np.column_stack((FZ, FX)) if count == COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
@@ -234,7 +237,7 @@ class CutSweep:
         return sum(self._is_silent(path, data[:place], truth) for place in places)
 
     def _is_silent(self, path: Path, data: bytes, truth: Truth) -> bool:
-        """Whether one cut goes unseen."""
+        """Whether one cut is not noticed by the reader."""
         path.write_bytes(data)
         try:
             source = open_source(path)

@@ -10,7 +10,7 @@ Read = dict[str, tuple[np.ndarray, str]]
 
 
 def by_numpy(path: Path) -> Read:
-    """CSV."""
+    """Read a CSV file by numpy."""
     with path.open(encoding="utf-8") as file:
         headings = next(csv.reader(line for line in file if not line.startswith("#")))
         table = np.genfromtxt(file, delimiter=",")
@@ -19,7 +19,7 @@ def by_numpy(path: Path) -> Read:
 
 
 def by_asammdf(path: Path) -> Read:
-    """MDF 4."""
+    """Read an MDF 4 file by asammdf."""
     from asammdf import MDF
 
     with MDF(path) as file:
@@ -27,7 +27,7 @@ def by_asammdf(path: Path) -> Read:
 
 
 def by_rpc3(path: Path) -> Read:
-    """RPC III."""
+    """Read an RPC III file by rpc3."""
     import rpc3
 
     rpc3.rpc3.progressbar = False
@@ -35,7 +35,7 @@ def by_rpc3(path: Path) -> Read:
 
 
 def by_nptdms(path: Path) -> Read:
-    """TDMS."""
+    """Read a TDMS file by npTDMS."""
     from nptdms import TdmsFile
 
     channels = [channel for group in TdmsFile.read(path).groups() for channel in group.channels()]

@@ -28,7 +28,7 @@ RPC = plain(".rsp")
 
 
 def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
-    """Make a file with other values of some parameters (``_`` for ``.``); None takes one away."""
+    """Function that makes a file with some header parameters changed (``_`` stands for ``.``) or, for None, removed."""
 
     def change(data: bytes) -> bytes:
         values = _values(data)
@@ -44,7 +44,7 @@ def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
 
 
 def _values(data: bytes) -> dict[str, Any]:
-    """Parameters of a header."""
+    """Header parameters of a file, by name."""
     count = int(data[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
     records = [data[i * RECORD : (i + 1) * RECORD] for i in range(count)]
     texts = [[part.rstrip(b"\0").decode("latin-1") for part in (record[:KEY], record[KEY:])] for record in records]
@@ -63,7 +63,7 @@ def sample(value: float) -> Make:
 
 
 def padded(count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Truth with the last value repeated up to so many samples."""
+    """Expected values, with the last one repeated up to ``count`` samples."""
     times, more = PERIOD * np.arange(count), (0, count - COUNT)
     return {name: (times, np.pad(values, more, mode="edge")) for name, (_, values) in usual().items()}
 

@@ -53,7 +53,7 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
 
 
 def changed(offset: int, new: bytes, length: int | None = None) -> Make:
-    """Make the usual file with other bytes, or cut off, counted from the beginning of its last segment."""
+    """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
 
     def change(data: bytes) -> bytes:
         begin = data.rindex(b"TDSm")
@@ -68,13 +68,13 @@ def cut_by(count: int) -> Make:
 
 
 def claims(new: int) -> Make:
-    """Make the usual file whose first channel claims another number of samples."""
+    """Make the usual file with a wrong number of samples stated for the first channel."""
     index, number = struct.pack("<LLLQ", 20, 10, 1, COUNT), struct.pack("<Q", new)
     return altered(TDMS, lambda data: patched(data, data.rindex(index) + 12, number))
 
 
 def beside_old_index(folder: Path) -> Path:
-    """Write the usual TDMS file next to the index file of another one."""
+    """Write the usual TDMS file beside an index file that belongs to another file."""
     other = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
     data = other.read_bytes()
     other.unlink()
@@ -83,17 +83,17 @@ def beside_old_index(folder: Path) -> Path:
 
 
 def one(name: str, values: Any, **properties: Any) -> tuple[str, str, Any, dict[str, Any]]:
-    """Return a channel of the usual clock."""
+    """A channel with the usual clock: group, name, values, properties."""
     return "g", name, values, CLOCK | properties
 
 
 def at(hour: int) -> np.datetime64:
-    """A start."""
+    """Start time of a recording at an hour."""
     return np.datetime64(f"2026-11-21T{hour:02d}:00:00")
 
 
 def prefix(**values: np.ndarray) -> Truth:
-    """Truth of some channels on the usual clock."""
+    """Expected values of some channels with the usual clock."""
     return {name: (TIMES, samples) for name, samples in values.items()}
 
 

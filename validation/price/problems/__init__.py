@@ -15,7 +15,7 @@ Curves = dict[tuple[str, str], tuple[float, ...]]
 
 
 def curves(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
-    """Curves of several methods of an engine over the same setting values."""
+    """Settings of several methods of an engine, all with the same list of values."""
     return {(engine, method): values for method in methods}
 
 
@@ -25,7 +25,7 @@ def ms(*steps: float) -> tuple[float, ...]:
 
 
 def each(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple[Setting, ...]:
-    """A setting for every value of every curve."""
+    """One setting for each value of each curve."""
     return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
 
 

@@ -51,13 +51,13 @@ SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12
 
 @dataclass
 class Tape:
-    """A controller whose valve commands are recorded."""
+    """Wrapper of a controller that records the valve commands."""
 
     inner: Controller
     valves: list[int]
 
     def sample(self, sample: Sample) -> Command:
-        """The inner one's answer."""
+        """Command of the wrapped controller for a sample."""
         command = self.inner.sample(sample)
         self.valves.append(int(np.asarray(command.valves)[0]))
         return Command(valves=np.array(self.valves[-1:]))
@@ -65,12 +65,12 @@ class Tape:
 
 @dataclass(frozen=True)
 class Played:
-    """A controller that sets the valves of a tape, the last one for ever."""
+    """A controller that replays recorded valve commands and repeats the last one for ever."""
 
     valves: np.ndarray
 
     def sample(self, sample: Sample) -> Command:
-        """The valve of the sample."""
+        """The recorded valve command of a sample."""
         return Command(valves=self.valves[min(sample.number, self.valves.size - 1), None])
 
 
@@ -84,13 +84,13 @@ class StopResult:
 
 @dataclass(frozen=True)
 class StopSolver:
-    """A run that is ready."""
+    """A stop by one method, ready to run."""
 
     run: Callable[[], StopResult]
 
 
 class BrakingStop:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: a braking stop with its reference solution; see ``validation.price.problems.Problem``."""
 
     key = "braking"
     note = (
@@ -125,7 +125,7 @@ class BrakingStop:
         return tuple(self.setting("reference", method, SAMPLE / n) for method, some in chosen.items() for n in some)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting by its curve and the longest step (s) up to ``value`` that divides a sample."""
+        """A setting: curve, and the longest step (s) up to ``value`` that divides a sample."""
         substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
         return Setting(
             engine, method, SAMPLE / substeps, ORDERS.get(method, 0), default=DEFAULTS.get((method, substeps), "")
@@ -142,7 +142,8 @@ class BrakingStop:
         return {"stopping distance": abs(solution.distance - self.true)}
 
     def _taped(self) -> np.ndarray:
-        """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
+        """Valve commands (n,) of the controller's own run, one per sample, with the last one repeated for some
+        samples."""
         tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
         vehicle = on_tyres(
             FRONT.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
@@ -151,7 +152,7 @@ class BrakingStop:
         return np.array(tape.valves + [tape.valves[-1]] * EXTRA_SAMPLES)
 
     def _distance_by_scipy(self, method: str, tolerance: float) -> float:
-        """Distance (m) by scipy, with the change of friction, locking and release as events."""
+        """Stopping distance (m) by scipy, where changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
         return tight_distance(FRONT, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
 
@@ -159,7 +160,7 @@ class BrakingStop:
         return float(np.interp(slip, self.slips, self.mu[i]))
 
     def _torques(self, substeps: int) -> np.ndarray:
-        """Torque (N m) at the ends of all steps."""
+        """Brake torque (N m) at the ends of all steps."""
         air, part = resting_chambers(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
         torques = [np.zeros(1)]
         for valve in self.valves:

@@ -38,7 +38,7 @@ DEFAULT_ANSWER = ("FASTSIM", 21)
 
 @dataclass(frozen=True)
 class ContactResult:
-    """Forces (n, 2) divided by mu N, what they took, and what the program says against them, if anything."""
+    """Forces (n, 2) divided by mu N, counts of work, and a doubt about the result ("" if none)."""
 
     forces: np.ndarray
     counts: dict[str, int]
@@ -47,13 +47,13 @@ class ContactResult:
 
 @dataclass(frozen=True)
 class ContactSolver:
-    """A run that is ready."""
+    """A theory on all contacts, ready to run."""
 
     run: Callable[[], ContactResult]
 
 
 class ContactAlone:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: rolling contacts with their exact forces; see ``validation.price.problems.Problem``."""
 
     key, duration, sure = "contact", 1.0, 0.25
     note = (
@@ -82,17 +82,17 @@ class ContactAlone:
         )
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and 1 by its cells."""
+        """A setting of this problem: curve, and 1 / number of cells as its value."""
         cells = round(1.0 / value)
         usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 
     def build(self, setting: Setting) -> ContactSolver:
-        """All contacts, each by one theory."""
+        """A solver that computes all contacts by one theory."""
         return ContactSolver(partial(self._run, self._ways[setting.engine, setting.method], round(1.0 / setting.value)))
 
     def errors(self, solution: ContactResult) -> dict[str, float]:
-        """Mean over the contacts, and what 95 of 100 keep to, both in % of mu N."""
+        """Error over the contacts in % of mu N: the mean, and the one that 95 of 100 contacts do not exceed."""
         off = 100.0 * np.linalg.norm(solution.forces - self._forces, axis=1)
         return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
 

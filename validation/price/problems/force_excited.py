@@ -61,7 +61,7 @@ SEED, DEVIATION = 77, 100.0
 
 
 def driven() -> Assembly:
-    """The vehicle cut off the road and driven by what its tyres carried there."""
+    """The vehicle without a road, driven by the wheel forces of its run on the road."""
     on_road = assemble(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", PERIOD / 80, DURATION))
     forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], PERIOD, held=False)
@@ -69,8 +69,9 @@ def driven() -> Assembly:
 
 
 class ForceExcited:
-    """The problem with its reference; see ``validation.price.problems.Problem``. ``first`` : of a kind of problem, the
-    quantity that tolerances are set on, before the states."""
+    """Test problem: a vehicle driven by wheel forces, with its reference solution; see
+    ``validation.price.problems.Problem``. ``first`` : the quantity of a variant for which tolerances are set, listed
+    before the states."""
 
     key, duration, full, quick = "forces", DURATION, FULL_STEPS, QUICK
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
@@ -100,11 +101,11 @@ class ForceExcited:
         return driven()
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """The quantities, (n, ...) each, at all instants of a run."""
+        """The compared quantities, (n, ...) each, at all rows of a run."""
         return {"state": run.states}
 
     def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """The quantities at the samples."""
+        """The compared quantities at the force samples."""
         every = (len(run.states) - 1) // round(DURATION / PERIOD)
         return {name: values[::every] for name, values in self.read(run).items()}
 
@@ -113,7 +114,8 @@ class ForceExcited:
         return each(self.quick if quick else self.full, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and the longest step (s) up to ``value`` that meets every sample."""
+        """A setting of this problem: curve, and the longest step (s) up to ``value`` such that every force sample falls
+        on a step."""
         return setting(engine, method, PERIOD / math.ceil(PERIOD / value * (1 - 1e-9)))
 
     def build(self, setting: Setting) -> Model:
@@ -121,14 +123,15 @@ class ForceExcited:
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of each quantity at the samples, which every fixed step meets; the run is judged."""
+        """Largest error of each quantity at the force samples, which lie on steps; the run's assumptions are
+        checked."""
         judge(self.assembly, solution)
         return apart(self._sampled(solution), self._true)
 
 
 class NoisyForces(ForceExcited):
-    """The force-excited problem with a fixed noise file for all solvers, so that no sampling error enters. An engineer
-    reads the forces of the suspension, which the measured wheel forces do not tell."""
+    """The force-excited problem with noisy forces. All solvers use the same noise file, so that no sampling error
+    enters. Its quantity is the suspension force, which measured wheel forces do not show."""
 
     key = "noise"
     note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
@@ -144,13 +147,13 @@ class NoisyForces(ForceExcited):
         return replace(clean, input=Sampled(clean.input.values + noise, PERIOD, held=False))
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """Both suspension forces, and states."""
+        """Both suspension forces and the states of a run."""
         channels = outputs(self.assembly, run)
         return {"suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]), "state": run.states}
 
 
 class PrescribedPitch(ForceExcited):
-    """The force-excited problem with its pitch prescribed, as measured on the road, and the moment that this takes.
+    """The force-excited problem with the pitch prescribed as measured on the road; its quantity is the enforced moment.
 
     The pitch at 100 Hz is a quintic spline: twice differentiable, and the same for all. A constraint is solved by
     Exudyn's generalised-alpha alone, whose multiplier needs a radius below one; MuJoCo and the reference have the
@@ -174,7 +177,7 @@ class PrescribedPitch(ForceExcited):
         return guided
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
-        """Moment of the prescribed pitch and the states, of a run."""
+        """The enforced moment and the states of a run."""
         assert run.moment is not None
         return {"enforced moment": run.moment, "state": run.states}
 

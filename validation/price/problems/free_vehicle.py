@@ -59,7 +59,7 @@ REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's
 
 
 def heights(positions: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
-    """Height (m) and slope of a track, 0 the left one and 1 the right one, at places (...) in m along the road."""
+    """Height (m) and slope of the left (0) or right (1) track at positions (...) in m along the road."""
     x, k = np.asarray(positions, dtype=float), np.arange(1, SINES + 1)
     angle = 2 * np.pi * (x[..., None] * k / LONGEST_SINE + GOLDEN * k * (k + SINES * track))
     shape = (HEIGHT / k * np.sin(angle)).sum(axis=-1)
@@ -76,7 +76,8 @@ class FreeVehicleSolver:
 
 
 class FreeVehicle:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: a free vehicle in space on a road, with its reference solution; see
+    ``validation.price.problems.Problem``."""
 
     key, duration = "vehicle", DURATION
     note = (
@@ -113,7 +114,7 @@ class FreeVehicle:
         return np.stack([*(height for height, _ in waves), *(SPEED * slope for _, slope in waves)], axis=-1)
 
     def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
-        """States (m, 2 n) at the instants, from rest."""
+        """States (m, 2 n) at the compared instants, started from rest."""
         n = len(self.vehicle.coordinates())
 
         def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -131,7 +132,8 @@ class FreeVehicle:
         return solution.y.T
 
     def read(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Wheel loads beside the static ones (m, w) in N and accelerations (m, p) in m/s^2 of states (m, 2 n)."""
+        """Changes of the wheel loads from the static ones (m, w) in N, and accelerations (m, p) in m/s^2, for states
+        (m, 2 n)."""
         road = self.road(times)
         n = states.shape[1] // 2
         given = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
@@ -142,11 +144,12 @@ class FreeVehicle:
         }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL_STEPS: there is no quick share, of which the reference alone would take seconds."""
+        """The settings FULL_STEPS, also in the quick share, since the reference alone takes seconds."""
         return each(FULL_STEPS, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting by its curve and the longest step (s) up to ``value`` that meets every instant, or a tolerance."""
+        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps; or
+        a tolerance."""
         known = CATALOGUE[engine][method.split()[0]]
         step = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
         return setting(engine, method, float(step))
@@ -160,7 +163,7 @@ class FreeVehicle:
         return FreeVehicleSolver(partial(model.run, rest, rest))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of any wheel load and of any acceleration, at the instants."""
+        """Largest error of any wheel load and of any acceleration at the compared instants."""
         every = round(GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::every]
         return apart(self.read(states, self.instants), self._true)

@@ -66,7 +66,7 @@ def attitude(times: np.ndarray) -> np.ndarray:
 
 
 def gyro(times: np.ndarray) -> np.ndarray:
-    """Local rates (n, 3) in rad/s at times (n,) in s: what a gyro without errors measures."""
+    """Angular rates (n, 3) in rad/s in body axes at times (n,) in s, as an ideal gyro measures them."""
     (roll, pitch, _), (by_roll, by_pitch, by_yaw) = (part.T for part in angles(times))
     return np.column_stack(
         [
@@ -94,18 +94,18 @@ def magnus(step: float) -> np.ndarray:
 
 
 def apart(computed: np.ndarray, true: np.ndarray) -> float:
-    """Largest angle (rad) between attitudes (n, 4)."""
+    """Largest angle (rad) between computed and true attitudes (n, 4)."""
     return float(np.linalg.norm(logarithm(product(conjugate(computed), true)), axis=-1).max())
 
 
 @dataclass(frozen=True)
 class AttitudeSolver:
-    """A setting, ready to run: a rule of our own, or the sphere of an engine."""
+    """One way to integrate an attitude, ready to run: one of our own rules, or a sphere in an engine."""
 
     setting: Setting
 
     def run(self) -> Attitudes:
-        """Attitudes at the instants; Refused or RunFailed by the engine."""
+        """Attitudes at the compared instants; Refused or RunFailed from the engine pass through."""
         engine, method, period = self.setting.engine, self.setting.method, self.setting.value
         count, every, start = round(DURATION / period), round(GRID / period), attitude(np.zeros(1))[0]
         if engine != "reference":
@@ -115,7 +115,7 @@ class AttitudeSolver:
 
 
 class InertialUnit:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: attitude from gyro rates, with its reference; see ``validation.price.problems.Problem``."""
 
     key, duration, bound = "unit", DURATION, 1.0
     note = (
@@ -139,7 +139,7 @@ class InertialUnit:
         return each(QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate))
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting by its curve and the longest step (s) up to ``value`` that meets every instant."""
+        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps."""
         step = GRID / np.ceil(GRID / value * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
@@ -158,7 +158,7 @@ class InertialUnit:
         return AttitudeSolver(setting)
 
     def errors(self, solution: Attitudes) -> dict[str, float]:
-        """Largest angle between the attitude and the true one at the instants."""
+        """Largest angle between computed and true attitude at the compared instants."""
         return {"attitude": apart(solution.quaternions, self.true)}
 
 

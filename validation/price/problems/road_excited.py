@@ -100,7 +100,7 @@ def scene(duration: float = DURATION):
 
 
 def judge(assembly: Assembly, run: Trajectory) -> Result:
-    """The run as a result that says which assumptions it breaks."""
+    """Result of a run with the assumptions that it broke."""
     channels = outputs(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     times = {"time": Channel("time", run.times, "s")}
@@ -108,7 +108,7 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
-    """A setting as the engines take it."""
+    """A setting converted to the engines' form."""
     return engine_settings(setting, duration)
 
 
@@ -126,7 +126,8 @@ def settings(quick: bool) -> tuple[Setting, ...]:
 
 
 def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
-    """A scipy solution of the paper's equations at any time, restarted where the road is only C2."""
+    """A scipy solution of the paper's equations that can be evaluated at any time, restarted at points where the road
+    is only C2."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
     assert assembly.input is not None
     at = assembly.input.at
@@ -149,7 +150,7 @@ def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
 
 
 class RoadExcited:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: a vehicle on a road, with its reference solution; see ``validation.price.problems.Problem``."""
 
     key, duration = "road", DURATION
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
@@ -185,19 +186,22 @@ class RoadExcited:
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of a wheel force (N) and of a state, at the integrator's own instants; the run is judged."""
+        """Largest errors of a wheel force (N) and of a state, at the rows of the solver; the run's assumptions are
+        checked."""
         judge(self.assembly, solution)
         return self._largest_errors(solution.states - self._reference_states(solution.times))
 
     def _reference_states(self, times: np.ndarray) -> np.ndarray:
-        """Reference states (n, 8): stored where the times lie on the grid, else the solver's own interpolant."""
+        """Reference states (n, 8): from the stored grid where the times lie on it, else by the solver's own
+        interpolant."""
         index = np.rint(times / GRID).astype(int)
         if np.abs(times - GRID * index).max() < 1e-12:
             return self._states[index]
         return self._solution(times).T
 
     def _largest_errors(self, state_errors: np.ndarray) -> dict[str, float]:
-        """Largest force and state error from the states' differences (n, 8); the road cancels."""
+        """Largest errors of wheel force and state from the state differences (n, 8). The road height is the same in
+        both forces and cancels."""
         p = self.assembly.parameters
         forces = state_errors[:, :2] * [p.k1, p.k2] + state_errors[:, 4:6] * [p.d1, p.d2]
         return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(state_errors).max())}

@@ -31,14 +31,15 @@ NUDGE = 1e-4
 
 @dataclass(frozen=True)
 class Attitudes:
-    """Quaternions (n, 4) at the instants that are compared, and what they took."""
+    """Quaternions (n, 4) at the compared instants, and counts of work."""
 
     quaternions: np.ndarray
     counts: dict[str, int]
 
 
 def in_mujoco(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
-    """``count`` steps of ``period`` (s) from an attitude (4,), every so many of them kept."""
+    """Attitudes of the rotating sphere in MuJoCo: ``count`` steps of ``period`` (s) from an attitude (4,), of which
+    every ``stride``-th is kept."""
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity, spec.option.integrator = period, [0, 0, 0], INTEGRATORS[method]
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
@@ -60,7 +61,7 @@ def in_mujoco(method: str, period: float, count: int, stride: int, start: np.nda
 
 
 def in_exudyn(method: str, period: float, count: int, stride: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
-    """Attitudes of the turning sphere by Exudyn; Refused for methods that do not end their steps on samples."""
+    """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
     name = method.split()[0]
     known = CATALOGUE["exudyn"][name]
     if known.adaptive:
@@ -86,7 +87,8 @@ def in_exudyn(method: str, period: float, count: int, stride: int, start: np.nda
 def _sphere(
     start: np.ndarray, rate: np.ndarray, torques: list[list[float]], period: float, implicit: bool, held: bool
 ) -> tuple[Any, Any]:
-    """The system and its sensor: a rotation vector from the start for explicit methods, Euler parameters for others."""
+    """The sphere's system in Exudyn and its sensor: a rotation vector from the start for explicit methods, Euler
+    parameters for implicit ones."""
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
@@ -122,7 +124,7 @@ def _sphere(
 
 
 def _sound(engine: str, attitudes: np.ndarray, counts: dict[str, int]) -> Attitudes:
-    """Attitudes of unit length, where they are numbers that are nearly so."""
+    """Attitudes normalised to unit length; raises RunFailed if a length differs from 1 by 1 % or is not finite."""
     size = np.linalg.norm(attitudes, axis=1, keepdims=True)
     if not (np.abs(size - 1) < 0.01).all():
         raise RunFailed(engine, "a quaternion is no rotation", 0.0)

@@ -82,7 +82,7 @@ QUICK: dict[tuple[str, str], tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class WheelsetResult:
-    """Positions and rates at the end (8,), and what they took."""
+    """Final coordinates and rates (8,), and counts of work."""
 
     state: Array
     counts: dict[str, int]
@@ -90,14 +90,15 @@ class WheelsetResult:
 
 @dataclass(frozen=True)
 class WheelsetSolver:
-    """A run that is ready."""
+    """A run by one method, ready to start."""
 
     run: Callable[[], WheelsetResult]
 
 
 @njit(cache=True, error_model="numpy")
 def rates(state, numbers, table, out):
-    """Fill ``out`` (2 n,) with the rates of places and rates; table (3, n) : masses, springs and dampers."""
+    """Fill ``out`` (2 n,) with the time derivatives of coordinates and rates; table (3, n) : masses, springs and
+    dampers."""
     n = table.shape[1]
     out[:n] = state[n:]
     out[n:] = 0.0
@@ -109,7 +110,7 @@ def rates(state, numbers, table, out):
 
 @njit(cache=True, error_model="numpy")
 def march(state, numbers, table, step, count):
-    """RK4: ``count`` steps (s) from ``state``, which is moved."""
+    """Advance ``state`` in place by ``count`` RK4 steps (s)."""
     total, rate = np.empty(state.size), np.empty(state.size)
     for _ in range(count):
         total[:] = 0.0
@@ -123,7 +124,8 @@ def march(state, numbers, table, step, count):
 
 
 class RollingWheels:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """Test problem: a rolling wheel with FASTSIM, with its reference solution; see
+    ``validation.price.problems.Problem``."""
 
     duration = DURATION
     note = (
@@ -151,7 +153,7 @@ class RollingWheels:
         return tuple(self.setting(*curve, value) for curve, values in chosen for value in values)
 
     def _explicit(self) -> list[tuple[tuple[str, str], tuple[float, ...]]]:
-        """Curves with their steps (s), by the stability of each method."""
+        """Curves with their steps (s), chosen within each explicit method's stability limit."""
         curves = []
         for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
             like = "Euler" if method == "discrete" else method
@@ -160,13 +162,13 @@ class RollingWheels:
         return curves
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and its step (s) or tolerance."""
+        """A setting of this problem: curve, and step (s) or tolerance."""
         made = setting(engine, method, value)
         kept = made.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made if kept else replace(made, order=0, nominal=made.order)
 
     def build(self, setting: Setting) -> WheelsetSolver:
-        """The wheel in one engine; Refused for a step that the method cannot take, or a method that is not there."""
+        """The wheel in one engine; raises Refused for an unstable step or a missing method."""
         method = setting.method.split()[0]
         if (setting.engine, method) in MISSING:
             raise Refused(setting.engine, MISSING[setting.engine, method])
@@ -180,11 +182,11 @@ class RollingWheels:
         return WheelsetSolver(partial(self._run_by_method, method, setting.value))
 
     def errors(self, solution: WheelsetResult) -> dict[str, float]:
-        """Largest error of the creep forces along and across (N), and of the displacements along and across (m)."""
+        """Largest errors of the creep forces (N) and of the displacements (m), longitudinal and lateral."""
         return self._channel_errors(self.read(solution.state))
 
     def read(self, state: Array) -> dict[str, Array]:
-        """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
+        """Quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, longitudinal and lateral."""
         force = np.zeros(FREEDOMS)
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
@@ -193,7 +195,7 @@ class RollingWheels:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
     def _run_by_method(self, method: str, value: float) -> WheelsetResult:
-        """The written equations by RK4 in steps, or by scipy at a relative tolerance."""
+        """Final state by the written equations: RK4 with steps, or a scipy method at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":
             steps = round(DURATION / value)

@@ -23,7 +23,7 @@ HEADS = ("problem", "quantity", "unit", "time [s]", "value", "uncertainty")
 
 
 def main(folder: Path, writers: tuple[Callable[[Path], list[Value]], ...] = WRITERS) -> None:
-    """Write a sheet and its inputs per problem, and ``reference_values.csv`` of all."""
+    """Write a problem sheet and its input files for each problem, and ``reference_values.csv`` for all problems."""
     values = [value for write in writers for value in write(folder)]
     with open(folder / "reference_values.csv", "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")

@@ -37,7 +37,7 @@ rest of the way is u^2 / (2 g mu(1))."""
 
 
 def write(folder: Path) -> list[Value]:
-    """The sheet, the tyre's tables and the valves; the stopping distance."""
+    """Write the sheet, tyre table and valve commands; returns the reference value of the stopping distance."""
     problem = braking_stop.problem(False)
     heads = ("slip", *(f"mu {name}" for name in SURFACES))
     columns(folder, "braking_friction", heads, np.column_stack([problem.slips, *problem.mu]))

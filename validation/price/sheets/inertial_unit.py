@@ -11,7 +11,7 @@ NAMES = ("q1", "q2", "q3", "q4")
 
 
 def write(folder: Path) -> list[Value]:
-    """The sheet; the quaternion at the end."""
+    """Write the sheet; returns the reference value of the final quaternion."""
     problem = inertial_unit.problem(False)
     sure = problem.uncertainty["attitude"]
     values = [

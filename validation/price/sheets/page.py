@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Value(NamedTuple):
-    """One reference value: of which problem and quantity, its unit, when (s), and how far it is known."""
+    """One reference value: its problem and quantity, unit, time (s), and uncertainty."""
 
     problem: str
     quantity: str
@@ -18,17 +18,17 @@ class Value(NamedTuple):
     uncertainty: float
 
     def cells(self) -> tuple[str, ...]:
-        """Cells of a line of ``reference_values.csv``, to all digits."""
+        """Cells of its line in ``reference_values.csv``, with all digits."""
         return (*self[:3], f"{self.time:.17g}", f"{self.value:.16e}", f"{self.uncertainty:.1e}")
 
 
 def columns(folder: Path, name: str, heads: Sequence[str], values: np.ndarray) -> None:
-    """Write columns (n, c) to ``name``.csv, to all digits."""
+    """Write columns (n, c) to ``name``.csv with all digits."""
     np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
 
 
 def matrices(folder: Path, name: str, arrays: dict[str, np.ndarray]) -> None:
-    """Write the entries of matrices that are not 0 to ``name``.csv: matrix, row, column (from 1), value."""
+    """Write the nonzero entries of matrices to ``name``.csv: matrix, row, column (counted from 1), value."""
     lines = ["matrix,row,column,value"]
     for key, values in arrays.items():
         lines += [f"{key},{i + 1},{j + 1},{values[i, j]:.17g}" for i, j in np.argwhere(values != 0.0)]
@@ -41,7 +41,8 @@ def vector(values: Sequence[float] | np.ndarray) -> str:
 
 
 def write(folder: Path, key: str, title: str, body: str, reference_value: str, values: list[Value]) -> list[Value]:
-    """The page: what is to be solved, then how the reference was made and what it gives; its values."""
+    """Write a sheet: the problem, and how its reference was computed and what it gives; returns the reference
+    values."""
     lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in values)
     (folder / f"{key}.md").write_text(f"""# {title}
 

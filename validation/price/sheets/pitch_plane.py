@@ -35,12 +35,12 @@ r is the road, positive down; A_i [m], W_i [rad/m], P_i [rad] are the lines of `
 
 
 def write(folder: Path) -> list[Value]:
-    """All four sheets with their inputs; the values of their references."""
+    """Write all four sheets with their inputs; returns the reference values."""
     return [*on_road(folder), *(value for make in PROBLEMS for value in by_forces(make(False), folder))]
 
 
 def on_road(folder: Path) -> list[Value]:
-    """The sheet of the vehicle on the study road."""
+    """Write the sheet of the vehicle on the study road."""
     problem, road = road_excited.problem(False), study_road()
     columns(
         folder,
@@ -63,7 +63,7 @@ def on_road(folder: Path) -> list[Value]:
 
 
 def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
-    """The sheet and the input of a problem that forces drive."""
+    """Write the sheet and input file of a problem with given forces."""
     signal, guided = problem.assembly.input, bool(problem.assembly.guided)
     assert signal is not None
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
@@ -82,7 +82,8 @@ def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
 
 
 def ends(problem: ForceExcited) -> list[Value]:
-    """Every state at the end, with the largest difference of the two reference solvers over the run."""
+    """Reference values of all final states; the uncertainty is the largest difference between two reference solvers
+    over the run."""
     runs = [
         build("reference", problem.assembly, settings).run()
         for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
@@ -98,7 +99,7 @@ def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list
 
 
 def _parameters_and_start(problem: ForceExcited | road_excited.RoadExcited) -> str:
-    """Parameters and the start."""
+    """Text of the parameters and the initial state."""
     numbers = ", ".join(f"{name} = {value!r}" for name, value in problem.assembly.parameters)
     start = ", ".join(f"{name} = {value:.16e}" for name, value in zip(NAMES, problem.assembly.initial, strict=True))
     return f"Parameters (SI): {numbers}.\n\nStart: {start}."

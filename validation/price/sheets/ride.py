@@ -11,7 +11,7 @@ from validation.price.sheets.page import write as write_page
 
 
 def write(folder: Path) -> list[Value]:
-    """The sheet and its matrices; the standard deviation of every output."""
+    """Write the sheet and its matrices; returns the reference value of each output's standard deviation."""
     problem = ride.problem()
     vehicle = problem.vehicle
     matrices(

@@ -57,7 +57,7 @@ with k = 1 .. {SINES}. Start: all coordinates and rates are 0.
 
 
 def write(folder: Path) -> list[Value]:
-    """The sheet; every place and rate at the end."""
+    """Write the sheet; returns the reference values of all final coordinates and rates."""
     problem = free_vehicle.problem(False)
     sure = np.abs(problem.states - problem.others).max(axis=0)
     values = [
@@ -80,7 +80,7 @@ def write(folder: Path) -> list[Value]:
 
 
 def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
-    """Names and units of positions, then of rates."""
+    """Names and units of the coordinates, then of their rates."""
     places = [
         (f"{body} {freedom}", "rad" if freedom.startswith("r") else "m")
         for body, freedom in problem.vehicle.coordinates()
@@ -89,7 +89,7 @@ def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
 
 
 def _tables(vehicle: SpatialVehicle) -> str:
-    """Every number of the vehicle."""
+    """Text with tables of all numbers of the vehicle."""
     held = preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
@@ -140,6 +140,6 @@ def _tables(vehicle: SpatialVehicle) -> str:
 
 
 def _table(heads: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
-    """A table of text and of numbers, these to all digits."""
+    """Text of a table; its numbers have all digits."""
     told = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *told))

@@ -6,12 +6,13 @@ from models.brake.controller import Command
 
 
 class Releases:
-    """Holds no state; ``below``: rim speed by the fastest one's, under which a wheel slips."""
+    """Controller that releases slipping wheels and else applies. ``below``: ratio of a wheel's rim speed to the fastest
+    one's below which it counts as slipping."""
 
     def __init__(self, wheels, below=0.8):
         self.below = below
 
     def sample(self, given):
-        """States of the valves."""
+        """Valve commands of a sample: -1 releases, 1 applies."""
         slow = np.asarray(given.wheels) < self.below * np.max(given.wheels)
         return Command(valves=np.where(slow, -1, 1))

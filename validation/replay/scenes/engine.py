@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 
 
 class Scipy:
-    """DOP853 of scipy at the tolerance that is asked for."""
+    """An outside engine: scipy's DOP853 at the requested tolerance."""
 
     order, adaptive = 8, True
 

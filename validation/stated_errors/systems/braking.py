@@ -36,18 +36,18 @@ TRAILER = {
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many stops that end, those among them that say why there is no number."""
+    """``count`` samples from stops that come to an end, also those whose result states no error."""
     return drawn(count, seed, _draw_stop)
 
 
 def _draw_stop(random: np.random.Generator) -> Sample:
-    """One stop; raises where tyres do not hold a circle, or a vehicle rolls over."""
+    """Sample from one random stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
     engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
     return _sample(scene, engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
-    """A scene of one procedure."""
+    """Table of a random scene with one procedure."""
     surface, kind, steps = (
         str(random.choice(list(SURFACES))),
         str(random.choice(CONTROLLERS)),
@@ -84,7 +84,7 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _of_car(random: np.random.Generator) -> dict[str, Any]:
-    """Brakes of the vehicle on its suspension."""
+    """Random brakes for a vehicle on its suspension."""
     gradient = random.uniform(200.0, 600.0)
     return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
 
@@ -98,7 +98,7 @@ def _procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
 
 
 def _sample(scene: BrakingScene, engine: str) -> Sample:
-    """Run with its error, and truth."""
+    """Run a scene with its stated error, and compute its true error by a finer run."""
     with counted() as calls:
         try:
             told = run(scene, engine, error=True)
@@ -117,7 +117,7 @@ def _sample(scene: BrakingScene, engine: str) -> Sample:
 
 @contextmanager
 def counted() -> Iterator[list[float]]:
-    """Steps of every run within the block."""
+    """Context that counts the steps of every run."""
     calls, march = list[float](), Braked.run
 
     def counting(vehicle: Braked, *given: Any) -> BrakingPath:

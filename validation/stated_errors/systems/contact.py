@@ -24,7 +24,7 @@ LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many random scenes; those that are refused are drawn anew."""
+    """``count`` samples from random scenes; scenes that are refused are replaced by others."""
     return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
 
 

@@ -23,18 +23,19 @@ CELL, STEP = 10, 8
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many manoeuvres whose runs end."""
+    """``count`` samples from random manoeuvres whose runs come to an end."""
     return drawn(count, seed, _draw_manoeuvre)
 
 
 def _draw_manoeuvre(random: np.random.Generator) -> Sample:
-    """One manoeuvre; raises where the tyres cannot follow a step, before any error is told."""
+    """Sample from one random manoeuvre; raises if the tyres cannot be integrated with the step, before an error is
+    estimated."""
     engine = str(random.choice(ENGINES))
     return _sample(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
-    """A scene of one manoeuvre; steps divide its duration."""
+    """Table of a random scene with one manoeuvre; its duration is a multiple of the step."""
     step, steps = float(f"{10.0 ** random.uniform(-3.4, -2.3):.3g}"), int(random.integers(120, 400))
     lasts = steps * step
     manoeuvre: dict[str, Any] = {
@@ -84,7 +85,7 @@ def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result:
 
 @contextmanager
 def counted() -> Iterator[list[float]]:
-    """Evaluations of the forces within the block, run by run, each times the cells of its tyres' nets."""
+    """Context that counts, for every run, evaluations of the forces times cells of the tyres' contact grids."""
     calls, march = list[float](), FreeModel.run
 
     def counting(model: FreeModel, q: np.ndarray, v: np.ndarray) -> Trajectory:

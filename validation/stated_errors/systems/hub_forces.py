@@ -25,18 +25,18 @@ FINER = 12
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many scenes whose runs end."""
+    """``count`` samples from random scenes whose runs come to an end."""
     return drawn(count, seed, _draw_scene)
 
 
 def _draw_scene(random: np.random.Generator) -> Sample:
-    """One scene; raises for steps in which a mode would grow, before any run."""
+    """Sample from one random scene; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
     return _sample(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
-    """A scene of a virtual measurement; steps divide its sampling period."""
+    """Table of a random virtual measurement; its sampling period is a multiple of the step."""
     step, part = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))
     noise = str(random.choice(["white", "none"]))
     return {
@@ -62,7 +62,7 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _sample(scene: HubScene, engine: str) -> Sample:
-    """Run with its error, and truth."""
+    """Run a scene with its stated error, and compute its true error by a finer run."""
     with counted() as calls:
         told = _run_with_error(scene, engine)
     errors, plain = errors_of(told), 2 * scene.steps
@@ -74,7 +74,7 @@ def _sample(scene: HubScene, engine: str) -> Sample:
 
 
 def _run_with_error(scene: HubScene, engine: str) -> Result:
-    """The run with its error, refused or not."""
+    """The run with its stated error; if the run fails on the way, its partial result."""
     try:
         return run(scene, engine, error=True)
     except RunFailed as error:
@@ -96,7 +96,7 @@ def _true_errors(scene: HubScene, engine: str, stated_result: Result, names: lis
 
 @contextmanager
 def counted() -> Iterator[list[float]]:
-    """Evaluations of the forces within the block, run by run."""
+    """Context that counts the force evaluations of every run."""
     calls, march = list[float](), HubModel.marched
 
     def counting(model: HubModel, q: np.ndarray, v: np.ndarray) -> Trajectory:

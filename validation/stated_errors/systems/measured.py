@@ -22,18 +22,19 @@ FINER = 12
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many recordings whose runs end."""
+    """``count`` samples from random recordings whose runs come to an end."""
     return drawn(count, seed, _draw_recording)
 
 
 def _draw_recording(random: np.random.Generator) -> Sample:
-    """One recording; raises for steps in which a mode would grow, before any run."""
+    """Sample from one random recording; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
     return _sample(_table(random), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
-    """A scene of a virtual measurement; steps of the road divide its period, those of the run are it."""
+    """Table of a random virtual measurement. The steps of the road run divide its sampling period; the steps of the
+    driven run are equal to it."""
     period, part = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
     road = {
         "iso8608": str(random.choice(list("BCD"))),
@@ -58,7 +59,7 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _sample(table: dict[str, Any], engine: str) -> Sample:
-    """Run with its error, and truth."""
+    """Run a recording with its stated error, and compute its true error."""
     scene = build(table, "drawn.toml")
     with counted() as calls:
         try:

@@ -31,13 +31,13 @@ PERIODS = (1e-3, 2e-3, 5e-3)
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` runs that were made; scenes that an engine refuses are drawn anew."""
+    """``count`` samples from random runs; scenes that an engine refuses are replaced by others."""
     with TemporaryDirectory() as folder:
         yield from drawn(count, [seed, 1], lambda random: _sample(random, Path(folder)))
 
 
 def _sample(random: np.random.Generator, folder: Path) -> Sample:
-    """One run; raises for an unstable step, and for a rule between samples that the method cannot read."""
+    """Sample from one random run; raises for an unstable step, and for an interpolation that the method cannot use."""
     engine = str(random.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
     integrator = str(random.choice(known))
@@ -63,7 +63,7 @@ def _run(scene: Scene, engine: str) -> Result:
 
 
 def _reference_run(scene: Scene, engine: str) -> Result:
-    """The reference run, in steps that are an integer part of the scene's."""
+    """The reference's run with steps that divide the scene's."""
     settings = settings_of(scene, engine)
     step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
     finer = max(1, round(step / FINEST if adaptive else min(FINER, step / FINEST)))
@@ -71,7 +71,7 @@ def _reference_run(scene: Scene, engine: str) -> Result:
 
 
 def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
-    """A channel of the truth at times (n,), by a cubic through the four rows about each that is none of its own."""
+    """A channel of the true run at times (n,): at its rows, or by a cubic spline if the times lie between them."""
     rows = np.clip(np.searchsorted(truth.times, times - 1e-9), 0, len(truth.times) - 1)
     if np.abs(truth.times[rows] - times).max() < 1e-9:
         return truth[name][rows]
@@ -80,7 +80,7 @@ def _truth_at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def _count_force_calls() -> Iterator[list[float]]:
-    """Force calls of every run that is made within."""
+    """Context that counts the force calls of every run."""
     calls: list[float] = []
     build_model = single.build
 
@@ -123,7 +123,7 @@ def _scene(rng: np.random.Generator, folder: Path, engine: str, integrator: str)
 
 
 def _vehicle(rng: np.random.Generator) -> dict[str, float]:
-    """A published vehicle whose parameters are all half to twice its own, dampers down to a tenth."""
+    """A published vehicle with random parameters: each half to twice the published one, dampers down to a tenth."""
     p = parameter_set(str(rng.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
     softer = float(rng.choice([1.0, 0.3, 0.1]))
     return {
@@ -154,7 +154,7 @@ def _road(rng: np.random.Generator, folder: Path) -> dict[str, Any]:
 
 
 def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
-    """Wheel forces that a virtual measurement leaves, perhaps with noise, perhaps with the pitch held."""
+    """Random wheel forces from a virtual measurement, sometimes with noise, sometimes with a prescribed pitch."""
     period, duration = float(rng.choice(PERIODS)), table["run"]["duration"]
     road = {"source": "study", "speed": float(rng.uniform(8.0, 25.0))}
     on_road = build(

@@ -35,7 +35,7 @@ ENGINES = ("exudyn", "mujoco")
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """Random rides of all kinds, in turn."""
+    """``count`` samples from random rides of all kinds in turn."""
     rng = np.random.default_rng(seed)
     kinds = (_in_time, _sample_of_sweep, _in_time, _driven, _in_time, _copies)
     for i in range(count):
@@ -43,7 +43,7 @@ def samples(count: int, seed: int) -> Iterator[Sample]:
 
 
 def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
-    """A scene with a road of random level, corners and correlation."""
+    """Random ride scene, with random level, corners and correlation of the road."""
     road = {
         "level": float(10 ** rng.uniform(-6.0, -4.3)),
         "corner_mean": float(rng.uniform(0.02, 0.5)),
@@ -55,7 +55,7 @@ def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **table
 
 
 def _varied(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
-    """The vehicle with other stiffnesses and dampings."""
+    """The vehicle with random changes of stiffnesses and dampings."""
     springs = tuple(
         replace(s, stiffness=s.stiffness * rng.uniform(0.6, 1.6), damping=s.damping * rng.uniform(0.5, 1.8))
         for s in vehicle.springs
@@ -70,7 +70,7 @@ def _sample_of(result: Result, name: str, engine: str, true: Mapping[str, float]
 
 
 def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
-    """Deviations of a linear vehicle at nine speeds, beside the same in extended precision."""
+    """Sample from the deviations of a linear vehicle at nine speeds, whose truth is computed in extended precision."""
     file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
     engine = str(rng.choice(["reference", *ENGINES]))
     scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
@@ -86,7 +86,7 @@ def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
 
 
 def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
-    """Deviations (p,) of a vehicle with undamped tyres in extended precision, from the matrices as they are."""
+    """Standard deviations (p,) of a vehicle with undamped tyres in extended precision, from its matrices."""
     system, n, m = excited(linear, road, speed), len(linear.mass), len(road.F)
     A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
     forces = np.hstack([linear.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
@@ -113,7 +113,7 @@ def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
 
 
 def _exponential(A: np.ndarray) -> np.ndarray:
-    """e^A in extended precision, by a series of a small part of A, squared."""
+    """Matrix exponential e^A in extended precision: series of a small fraction of A, then squaring."""
     halvings = max(0, int(np.ceil(np.log2(float(abs(A).sum(axis=1).max()) + 1e-30))) + 1)
     small, term = A / 2**halvings, np.eye(len(A), dtype=np.longdouble)
     total = term.copy()
@@ -126,7 +126,8 @@ def _exponential(A: np.ndarray) -> np.ndarray:
 
 
 def _driven(rng: np.random.Generator, number: int) -> Sample:
-    """A drive with two pieces, beside the same in steps eight times shorter, whose error is some 1e-9 of its own."""
+    """Sample from a drive with two sections, whose truth has steps eight times shorter (error about 1e-9 of the step's
+    own)."""
     first = float(rng.choice([0.0, rng.uniform(2.0, 15.0)]))
     drive = {"time": [0.0, float(rng.uniform(1.0, 2.0)), 3.0], "speed": [first, *rng.uniform(3.0, 30.0, 2).tolist()]}
     scene = _scene(rng, "quarter_car", drive=drive, study="ride_drive")
@@ -145,7 +146,8 @@ def _driven(rng: np.random.Generator, number: int) -> Sample:
 
 
 def _copies(rng: np.random.Generator, number: int) -> Sample:
-    """Copies and gains of a bent quarter car, beside many more copies in shorter steps; chance is part of both."""
+    """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the truth has many more
+    copies and shorter steps. Both contain random scatter."""
     speed = float(rng.uniform(5.0, 35.0))
     scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=number)
@@ -167,7 +169,8 @@ def _copies(rng: np.random.Generator, number: int) -> Sample:
 
 
 def _in_time(rng: np.random.Generator, number: int) -> Sample:
-    """A run in time, bent springs or tyres that lift, beside one in much shorter steps on the same road."""
+    """Sample from a run in time with nonlinear springs or tyres that lift, whose truth has much shorter steps on the
+    same road."""
     bent, speed = rng.random() < 0.5, float(rng.uniform(5.0, 40.0))
     file = "quarter_car_nonlinear" if bent else str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
     tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
@@ -197,7 +200,7 @@ def _in_time(rng: np.random.Generator, number: int) -> Sample:
 def _path(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
 ) -> RoadPath:
-    """The road as ``in_engine`` cuts it."""
+    """The road path with the step that ``in_engine`` uses."""
     from models.ride.nonlinear_copies import followed
     from models.ride.road_path import road_path
     from models.systems.ride.nonlinear import STEP

@@ -19,7 +19,7 @@ FINER, POSITIONS = 4.0, 4
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many random scenes; those that fail or are refused are drawn anew."""
+    """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
     return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
 
 

@@ -28,7 +28,7 @@ LONGEST = 2.4
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
-    """So many random scenes; those that fail or are refused are drawn anew."""
+    """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
     return drawn(count, seed, lambda random: _sample(*_draw_scene(random)))
 
 
@@ -84,7 +84,7 @@ def _cells(scene: WheelsetScene) -> float:
 def _true_errors(
     scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]
 ) -> Mapping[str, float]:
-    """Errors by the channels of the estimates, of steps and of cells."""
+    """True errors by steps and by cells, for the channels of the estimates."""
     fine = series(run.detail)
     true = _rms_differences(fine, series(march(changed(scene, 1.0 / FINER))))
     if scene.contact.law == "linear":
