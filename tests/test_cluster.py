@@ -81,6 +81,18 @@ def address_of(folder):
     raise AssertionError((folder / "scheduler.log").read_text())
 
 
+def end(processes):
+    """Ask processes to end, and kill those that a busy machine has not let end in a minute."""
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        try:
+            process.wait(60)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
 @pytest.fixture(scope="module")
 def secure(tmp_path_factory):
     """Address of the cluster, its scheduler, and the folder with its certificate."""
@@ -99,10 +111,7 @@ def secure(tmp_path_factory):
                 client.wait_for_workers(3, timeout=300)
             yield address, scheduler, folder
     finally:
-        for process in (*workers, scheduler):
-            process.terminate()
-        for process in (*workers, scheduler):
-            process.wait(30)
+        end((*workers, scheduler))
 
 
 @pytest.mark.full
