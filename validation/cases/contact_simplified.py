@@ -94,7 +94,7 @@ def largest_jump(patch: Patch, steps: int) -> float:
 
 
 def _jump(load: Callable[[float], float], low: float, high: float) -> float:
-    """Jump (N) of the load, found by bisection, between two depths that are adjacent floating-point numbers."""
+    """Jump (N) of the load, located by bisection, between two depths that are 1e-15 of the larger one apart."""
     at_low, at_high = load(low), load(high)
     while high - low > 1e-15 * high:
         middle = 0.5 * (low + high)

@@ -105,7 +105,7 @@ def _largest_finite(values: Array) -> float:
     """The largest value; infinite if a value is not finite; 0 if there are no values or all are negative."""
     if not values.size:
         return 0.0
-    return float(max(0.0, np.where(np.isnan(values), np.inf, values).max()))
+    return float(max(0.0, np.where(np.isfinite(values), values, np.inf).max()))
 
 
 def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:

@@ -11,7 +11,10 @@ from models.brake.port.socket_port import LOOPBACK
 
 
 def serve(controller: Controller, port: int) -> int:
-    """Answer every question at a port of this machine until the connection closes; returns the number of answers."""
+    """Connect to a port of this machine and answer every question until the connection closes.
+
+    Returns the number of answers.
+    """
     count = 0
     with socket.create_connection((LOOPBACK, port)) as link, link.makefile("rb") as reader:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
