@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from models.own_model import certificate as certifying
-from models.own_model.builds import SOFT, equations
+from models.own_model.builds import SOFT, Moved, equations
 from models.own_model.certificate import agreement, certificate, moved_at, reference, states_of
 from models.own_model.explain import compare
 from models.own_model.file import read
+from models.own_model.rounding import _solved
 from validation.own_model.files import GEARED
 
 
@@ -81,3 +83,12 @@ def test_rounding_of_what_constraints_stop_is_no_difference(tmp_path, anchor):
     assert all(row.alike for row in certificate(twin, 20))
     heavier = replace(twin.driven, gravity=(1.0 + 1e-8) * twin.driven.gravity)
     assert not any(row.alike for row in certificate(replace(twin, driven=heavier), 5))
+
+
+def test_solving_rounds_a_light_coordinate_only_where_the_mass_matrix_couples_it():
+    """The second coordinate accelerates a million times as much; by hand |M^-1| |M| |a|."""
+    none, acceleration = np.zeros(2), np.array([1.0, 1e6])
+    for off, expected in ((0.0, acceleration), (0.5, np.array([[5.0, 4.0], [4.0, 5.0]]) / 3.0 @ acceleration)):
+        moved = Moved(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
+        solved = _solved(Moved(np.zeros((2, 2)), none, none), moved)
+        assert solved.acceleration == pytest.approx(expected, rel=1e-12)

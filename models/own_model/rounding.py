@@ -7,6 +7,9 @@ change of an answer divided by the share, times the rounding of a number, is wha
 coordinate has its own: a light wheel that spins up fast says nothing about a heavy slide beside it, unless the mass
 matrix couples them; a stiff constraint magnifies the rounding of places; weights that a joint bears leave rounding
 where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
+
+Solving for accelerations rounds once more, and the entries of the mass matrix independently of one another, which no
+change of the model's numbers does: that is added (``_solved``). Up to 100 roundings of it were seen, on a car.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -56,10 +59,11 @@ def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Seq
 
 
 def _solved(sensitive: Moved, moved: Moved) -> Moved:
-    """Sensitivities with that of solving M a = f, whose rounding is a relative change of every entry of M (Skeel).
+    """Sensitivities with that of solving M a = f, whose rounding is a relative change of every entry of M.
 
-    A light seat on a car takes its share of the rounding of wheels that spin up a million times as fast; a coordinate
-    that the mass matrix does not couple with others takes none.
+    This is Skeel's componentwise condition, |M^-1| |M| |a| (Higham 2002, Accuracy and Stability of Numerical
+    Algorithms, section 7.2; recalled). A light seat on a car takes its share of the rounding of wheels that spin up a
+    million times as fast; a coordinate that the mass matrix does not couple with others takes none.
     """
     inverse = np.abs(np.linalg.pinv(moved.mass))
     solution = inverse @ np.abs(moved.mass) @ np.abs(moved.acceleration)
