@@ -81,9 +81,11 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
     ]
 
 
-def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None = None) -> Ride:
-    """Run the bicycle on its tyres in an engine with a step (s). Recorded rows are at most ROWS_APART (s) apart, while
-    the work counts all steps.
+def ridden(
+    scene: BicycleScene, engine: str, step: float, duration: float | None = None, stride: int | None = None
+) -> Ride:
+    """Run the bicycle on its tyres in an engine with a step (s). The work counts all steps; recorded rows are
+    ``stride`` steps apart, or if that is not given at most ROWS_APART (s), the last one at the run's end.
     """
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
@@ -93,8 +95,8 @@ def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None
         raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
     tyres, ledger = rolling.report(path.positions, path.rates)
     work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
-    steps, most = len(path.times) - 1, max(1, int(ROWS_APART / step * (1.0 + 1e-9)))
-    kept = slice(None, None, next(every for every in range(most, 0, -1) if steps % every == 0))
+    steps = len(path.times) - 1
+    kept = slice(None, None, stride or _stride(steps, step))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept], path.rates[kept]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
     ride = Ride(path.times[kept], q, v, motion + ledger[kept, POTENTIAL], work[kept], steps, tyres[kept])
@@ -102,6 +104,14 @@ def ridden(scene: BicycleScene, engine: str, step: float, duration: float | None
         why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
         raise RunFailed(engine, why, float(path.times[-1]))
     return ride
+
+
+def _stride(steps: int, step: float) -> int:
+    """Largest number of steps (s) between rows that are at most ROWS_APART (s) and a twentieth of the run apart, and
+    end with the run.
+    """
+    most = max(1, min(int(ROWS_APART / step * (1.0 + 1e-9)), steps // 20))
+    return next(stride for stride in range(most, 0, -1) if steps % stride == 0)
 
 
 def ideal(scene: BicycleScene) -> Ride:
@@ -114,7 +124,8 @@ def ideal(scene: BicycleScene) -> Ride:
 
 def _with_step_error(run: Result, scene: BicycleScene) -> Result:
     """The result with the error that its finite time steps cause, estimated by runs in longer steps."""
-    ride, engine = run.detail, run.data.attrs["engine"]
+    ride, engine, duration = run.detail, run.data.attrs["engine"], scene.run.duration
+    stride = _stride(ride.steps, scene.run.step)  # in steps of any length: rows of longer ones are among these rows
 
     def series(ride: Ride) -> Series:
         columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in SHOWN}
@@ -122,7 +133,11 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
 
     def rerun(factor: float, share: float) -> Series:
         step = factor * scene.run.step
-        return series(ridden(scene, engine, step, step * max(2, round(share * scene.run.duration / step))))
+        steps = int(share * duration / step * (1.0 + 1e-9))
+        if factor > 1.0 and steps < 2 * stride:
+            raise RunFailed(engine, f"steps of {step:g} s are too long for {share * duration:g} s")
+        steps = max(steps, 2 * stride)
+        return series(ridden(scene, engine, step, steps * step, stride))
 
     told, how = by_steps(series(ride), rerun, 4.0, scene.run.step)
     return stated(run, told, how)
