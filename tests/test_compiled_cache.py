@@ -181,3 +181,22 @@ def test_machine_code_is_kept_in_the_users_folder_where_the_packages_is_closed(t
     )
     assert told.stdout == "3.0\n", told.stderr
     assert [path.name for path in kept.rglob("*.nbc")], "numba's own way, as long as this passes"
+
+
+def test_classes_that_kernels_take_are_in_files_that_import_no_engine():
+    """Whoever reads a kernel's index imports the classes of all its signatures. The callback of spatial MuJoCo models
+    stays apart: its classes remain within it."""
+    models = Path(compiled.ROOT) / "models"
+    files = [
+        path
+        for path in sorted(models.rglob("*.py"))
+        if "(NamedTuple)" in (text := path.read_text()) and "from models.machine.compiled import" in text
+    ]
+    names = [".".join(path.relative_to(compiled.ROOT).with_suffix("").parts) for path in files]
+    assert len(names) > 20 and "models.engines.mujoco_native" in names
+    script = (
+        f"import importlib, sys\nfor name in {names!r}:\n    importlib.import_module(name)\n"
+        "print([name for name in ('exudyn', 'mujoco') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,18 +1,23 @@
-"""MuJoCo's own functions called by compiled code: a model's accelerations and steps without a line of Python."""
+"""MuJoCo's own functions called by compiled code: a model's accelerations and steps without a line of Python.
+
+Whoever reads the list of a kernel's signatures imports the classes in them, those of other engines' runs included. So
+this file imports MuJoCo only where a model is at hand.
+"""
 
 import ctypes
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import llvmlite.ir as ir
-import mujoco
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from models.engines.mujoco_layout import offset
 from models.machine.compiled import lean
+
+if TYPE_CHECKING:
+    import mujoco
 
 _intrinsic: Any = intrinsic
 
@@ -50,11 +55,15 @@ def _call(typing_context, function, model, data):
 @cache
 def _library() -> ctypes.CDLL:
     """The MuJoCo library that this process has loaded."""
+    import mujoco
+
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
 
 
-def native(model: mujoco.MjModel, data: mujoco.MjData) -> Native:
+def native(model: "mujoco.MjModel", data: "mujoco.MjData") -> Native:
     """The model and its data for compiled functions; both must outlive the result."""
+    from models.engines.mujoco_layout import offset
+
     time = ctypes.c_double.from_address(data._address + offset("mjData", "time"))
     forward, step = (
         ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0 for name in ("mj_forward", "mj_step")
