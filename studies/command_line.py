@@ -5,7 +5,7 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,7 @@ from studies.command.asked import (
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import given_crew
 from studies.command.finishing import exit_with_message, finish, folder_of, profile_lines, untold_findings
+from studies.command.second_compiler import compiled_beside
 from studies.command.waiting import waiting
 
 app = typer.Typer(
@@ -191,12 +192,14 @@ def run_scene(
     with _queried(loaded):
         with waiting("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
-        if plain_arrays(loaded, engines, module):
+        plain = plain_arrays(loaded, engines, module)
+        if plain:
             leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
-        finish(telling(work), folder, as_json, doubts, strict, loaded.system)
+        with compiled_beside(scene, changes or [], engines, not no_error) if plain else nullcontext():
+            finish(telling(work), folder, as_json, doubts, strict, loaded.system)
 
 
 @contextmanager

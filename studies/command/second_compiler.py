@@ -1,0 +1,73 @@
+"""A second process that compiles the kernels of a scene's last engine while the first engines are at work.
+
+It does what compiles them: it runs the scene in that engine, into a folder that is thrown away. It begins when kernels
+turn out to be missing, which happens once after an installation, where a user waits at a terminal and a core is idle.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from studies.command.asked import checked_study, load_scene
+from studies.command.waiting import Kernels
+
+MISSING = 1.0
+"""s of compilation from which on kernels are taken to be missing: loading those of a scene takes less."""
+
+
+class SecondCompiler(Kernels):
+    """Starts a command once, as soon as this process has compiled for MISSING seconds."""
+
+    def __init__(self, command: list[str]) -> None:
+        super().__init__()
+        self.command = command
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def _start(self, *event: Any) -> None:
+        super()._start(*event)
+        if self.process is None and self.spent() > MISSING:
+            nowhere = subprocess.DEVNULL
+            self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
+
+    def end(self) -> None:
+        """Stop the command, if it still runs, and wait until it is gone."""
+        self.detach()
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+
+
+@contextmanager
+def compiled_beside(name: str, changes: list[str], engines: tuple[str, ...], error: bool) -> Iterator[None]:
+    """Context in which a second process compiles the kernels of a scene's last engine, where they are missing.
+
+    name, changes, engines : of the scene, as the user gave them; error : whether errors are estimated, too.
+    """
+    if len(engines) < 2 or (os.cpu_count() or 1) < 2 or not sys.stderr.isatty():
+        yield
+        return
+    with TemporaryDirectory() as folder:
+        told = json.dumps([name, changes, engines[-1], error, folder])
+        compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, told])
+        compiler.attach()
+        try:
+            yield
+        finally:
+            compiler.end()
+
+
+def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, folder: str) -> None:
+    """Run a scene in one engine, into a folder, for the sake of the kernels that this compiles."""
+    scene = load_scene(name, changes)
+    scene = scene.model_copy(update={"error": scene.error and error})
+    checked_study(scene, (engine,)).run(scene, (engine,), Path(folder), lambda text, share: None)
+
+
+if __name__ == "__main__":
+    run_for_kernels(*json.loads(sys.argv[1]))

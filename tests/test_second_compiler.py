@@ -1,0 +1,65 @@
+"""A second process compiles the kernels of a scene's last engine, where they are missing and somebody waits."""
+
+import json
+import sys
+
+import pytest
+from test_waiting import ROOT, on_terminal
+
+from studies.command import second_compiler
+from studies.command.second_compiler import SecondCompiler, compiled_beside, run_for_kernels
+
+COUNTED = """
+import time
+from pathlib import Path
+from studies.command import second_compiler
+second_compiler.__name__ = "seen"
+second_compiler.MISSING = {missing}
+import numba
+from numba.core import event
+with second_compiler.compiled_beside("release", ["run.duration=1"], ("exudyn", "mujoco"), True):
+    for _ in range(2):
+        with event.trigger_event("numba:compiler_lock"):
+            pass
+    begun = time.monotonic()
+    while {missing} == 0 and not Path("told.json").exists() and time.monotonic() < begun + 60.0:
+        time.sleep(0.01)
+"""
+"""Compiles twice, in no time; the second process is this file."""
+SEEN = 'import sys\nfrom pathlib import Path\nPath("new").write_text(sys.argv[1])\nPath("new").rename("told.json")\n'
+
+
+@pytest.mark.parametrize("missing", [0, 60])
+def test_the_second_process_begins_once_kernels_are_missing(missing, tmp_path):
+    (tmp_path / "seen.py").write_text(SEEN)
+    script = f"import os\nos.environ['PYTHONPATH'] += ':{tmp_path}'\n{COUNTED.format(missing=missing)}"
+    on_terminal(sys.executable, "-c", script, folder=tmp_path)
+    assert (tmp_path / "told.json").exists() == (missing == 0)
+    if missing == 0:
+        *asked, folder = json.loads((tmp_path / "told.json").read_text())
+        assert asked == ["release", ["run.duration=1"], "mujoco", True] and not ROOT.joinpath(folder).exists()
+
+
+def test_no_process_begins_where_nobody_waits(monkeypatch):
+    monkeypatch.setattr(second_compiler, "SecondCompiler", None)
+    with compiled_beside("release", [], ("exudyn", "mujoco"), True):
+        pass
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with compiled_beside("release", [], ("exudyn",), True):
+        pass
+
+
+def test_its_end_ends_the_process():
+    compiler = SecondCompiler([sys.executable, "-c", "import time; time.sleep(600)"])
+    compiler.end()
+    compiler.total = 60.0
+    compiler._start()
+    assert compiler.process.poll() is None
+    compiler.end()
+    assert compiler.process.poll() is not None
+
+
+def test_what_it_runs_is_the_scene_in_that_engine(empty_folder, tmp_path_factory):
+    away = tmp_path_factory.mktemp("away")
+    run_for_kernels("release", ["run.duration=0.1"], "mujoco", False, str(away))
+    assert not list(empty_folder.iterdir()) and (away / "mujoco.nc").exists() and not (away / "exudyn.nc").exists()
