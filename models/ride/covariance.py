@@ -60,7 +60,7 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryC
     """
     met = hits(system)
     split = split_marginal(system.A, accuracy)
-    onto_stable = met._replace(B=[(split.W @ b).astype(float) for b in met.B])
+    onto_stable = met._replace(B=[split.W @ b for b in met.B])  # in extended precision: modes may be nearly parallel
     P, correction, residual = lyapunov(split.S, intensity(split.S, onto_stable))
     V = split.V
     if split.marginal:
@@ -231,7 +231,7 @@ def _with_marginal(
     if len(split.S):
         from control import lyap
 
-        cross = lyap(split.M, split.S.T, cross, method="scipy")
+        cross = lyap(split.M, split.S.T, cross.astype(float), method="scipy")
     whole = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
     changed = np.zeros_like(whole)
     changed[k:, k:] = correction

@@ -15,6 +15,9 @@ from models.contact.inputs import Array
 from models.rail.profile_contact import SHARPEST, TOUCH, LaidProfile, Pose
 from validation.contact.plain_fastsim import hertz
 
+SETTLED = 1e-12
+"""Share of a patch's load by which loads and depths may disagree."""
+
 
 def rail_of(profile: LaidProfile) -> PPoly:
     """Depth of the right rail's surface below its top (m) over y (m) from the middle of the track."""
@@ -91,4 +94,7 @@ def settled(touches: Array, modulus: float) -> Array:
         left = np.where(loaded, np.maximum(depths(share * loads), 0.0) / np.where(loaded, alone, 1.0), 0.0)
         return share - left**1.5
 
-    return depths(fsolve(off, np.ones(alone.size), xtol=1e-14) * loads)
+    share = fsolve(off, np.ones(alone.size), xtol=1e-14, full_output=True)[0]  # which no processor need reach
+    if not np.abs(off(share)).max() < SETTLED:
+        raise ArithmeticError(f"the loads of touching patches do not settle: {off(share)}")
+    return depths(share * loads)

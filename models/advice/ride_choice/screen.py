@@ -42,17 +42,16 @@ class Solved:
 def solve(system: DelayedSystem, rows: list[int]) -> Solved:
     """Covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a restoring
     force.
+
+    Noise and outputs stay in extended precision in the coordinates of the modes, too: where these are nearly parallel,
+    a variance is a small difference of large terms.
     """
     split = split_marginal(system.A)
     if split.marginal:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
-    noise = noise_of(system)
-    Q = (split.W @ noise @ split.W.T).astype(float)
-    V, W = split.V, split.W
-    P = V @ lyapunov(split.S, Q)[0] @ V.T
-    C = system.C[rows]
-    seen = (C @ V).astype(float)
-    L = np.array([W.T @ lyapunov(split.S.T, np.outer(c, c))[0] @ W for c in seen])
+    V, W, C = split.V, split.W, system.C[rows]
+    P = V @ lyapunov(split.S, W @ noise_of(system) @ W.T)[0] @ V.T
+    L = np.array([W.T @ lyapunov(split.S.T, np.outer(c, c))[0] @ W for c in C @ V])
     return Solved(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
 
 
