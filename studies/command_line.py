@@ -5,7 +5,7 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -189,17 +189,15 @@ def run_scene(
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error, **given_crew(workers, cluster)})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    with _queried(loaded):
+    with _queried(loaded), compiled_beside(scene, changes or [], loaded, engines):
         with waiting("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
-        plain = plain_arrays(loaded, engines, module)
-        if plain:
+        if plain_arrays(loaded, engines, module):
             leave_out(*OF_LABELS)
         folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
-        with compiled_beside(scene, changes or [], engines, not no_error) if plain else nullcontext():
-            finish(telling(work), folder, as_json, doubts, strict, loaded.system)
+        finish(telling(work), folder, as_json, doubts, strict, loaded.system)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import pytest
 from test_waiting import ROOT, on_terminal
 
 from studies.command import second_compiler
-from studies.command.second_compiler import SecondCompiler, compiled_beside, run_for_kernels
+from studies.command.second_compiler import SecondCompiler, compiled_beside, load_scene, run_for_kernels
 
 COUNTED = """
 import time
@@ -17,7 +17,9 @@ second_compiler.__name__ = "seen"
 second_compiler.MISSING = {missing}
 import numba
 from numba.core import event
-with second_compiler.compiled_beside("release", ["run.duration=1"], ("exudyn", "mujoco"), True):
+changes = ["run.duration=1"]
+scene = second_compiler.load_scene("release", changes)
+with second_compiler.compiled_beside("release", changes, scene, ("exudyn", "mujoco")):
     for _ in range(2):
         with event.trigger_event("numba:compiler_lock"):
             pass
@@ -42,10 +44,13 @@ def test_the_second_process_begins_once_kernels_are_missing(missing, tmp_path):
 
 def test_no_process_begins_where_nobody_waits(monkeypatch):
     monkeypatch.setattr(second_compiler, "SecondCompiler", None)
-    with compiled_beside("release", [], ("exudyn", "mujoco"), True):
+    scene = load_scene("release", [])
+    with compiled_beside("release", [], scene, ("exudyn", "mujoco")):
         pass
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with compiled_beside("release", [], ("exudyn",), True):
+    with compiled_beside("release", [], scene, ("exudyn",)):
+        pass
+    with compiled_beside("ensemble", [], load_scene("ensemble", []), ("exudyn", "mujoco")):  # which has workers
         pass
 
 

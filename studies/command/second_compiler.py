@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from studies.command.asked import checked_study, load_scene
+from studies.command.asked import load_scene, plain_arrays, study_of
 from studies.command.waiting import Kernels
 
 MISSING = 1.0
@@ -44,16 +44,18 @@ class SecondCompiler(Kernels):
 
 
 @contextmanager
-def compiled_beside(name: str, changes: list[str], engines: tuple[str, ...], error: bool) -> Iterator[None]:
-    """Context in which a second process compiles the kernels of a scene's last engine, where they are missing.
+def compiled_beside(name: str, changes: list[str], scene: Any, engines: tuple[str, ...]) -> Iterator[None]:
+    """Context in which a second process compiles the kernels of the scene's last engine, where they are missing.
 
-    name, changes, engines : of the scene, as the user gave them; error : whether errors are estimated, too.
+    name, changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its own, or
+    code of the user's.
     """
-    if len(engines) < 2 or (os.cpu_count() or 1) < 2 or not sys.stderr.isatty():
+    idle = len(engines) > 1 and (os.cpu_count() or 1) > 1 and sys.stderr.isatty()
+    if not idle or not plain_arrays(scene, engines, study_of(scene)):
         yield
         return
     with TemporaryDirectory() as folder:
-        told = json.dumps([name, changes, engines[-1], error, folder])
+        told = json.dumps([name, changes, engines[-1], scene.error, folder])
         compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, told])
         compiler.attach()
         try:
@@ -63,10 +65,11 @@ def compiled_beside(name: str, changes: list[str], engines: tuple[str, ...], err
 
 
 def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, folder: str) -> None:
-    """Run a scene in one engine, into a folder, for the sake of the kernels that this compiles."""
-    scene = load_scene(name, changes)
-    scene = scene.model_copy(update={"error": scene.error and error})
-    checked_study(scene, (engine,)).run(scene, (engine,), Path(folder), lambda text, share: None)
+    """Run a scene in one engine, into a folder, for the sake of the kernels that this compiles. The first process
+    checks the scene, which compiles others.
+    """
+    scene = load_scene(name, changes).model_copy(update={"error": error})
+    study_of(scene).run(scene, (engine,), Path(folder), lambda text, share: None)
 
 
 if __name__ == "__main__":
