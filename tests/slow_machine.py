@@ -26,16 +26,22 @@ def begin():
     time.perf_counter, time.process_time = Clock(time.perf_counter, 1), Clock(time.process_time, 2)
 
 
-def rows(case, quick, folder):
-    """Id, status and reason of all rows of a case."""
-    return answer(case, quick, folder)[0]
+def rows(case, quick, folder, fewer=None):
+    """Id, status and reason of all rows of a case, with other values ``fewer`` of its module's constants, by name."""
+    return answer(case, quick, folder, fewer)[0]
 
 
-def answer(case, quick, folder):
+def answer(case, quick, folder, fewer=None):
     """Id, status and reason of all rows of a case, and the case's data."""
+    from contextlib import ExitStack
     from importlib import import_module
+    from unittest.mock import patch
 
-    judged_rows, data = import_module(f"validation.cases.{case}").measure(quick, folder)
+    module = import_module(f"validation.cases.{case}")
+    with ExitStack() as within:
+        for name, value in (fewer or {}).items():
+            within.enter_context(patch.object(module, name, value))
+        judged_rows, data = module.measure(quick, folder)
     return [(row.id, row.status, row.reason) for row in judged_rows], data
 
 

@@ -76,41 +76,45 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    priced, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _in_processes()
+    rounds = ROUNDS[quick]
+    if quick:
+        priced, (beside, data) = [_priced(True, rounds, make) for make in PROBLEMS], _beside(True, rounds)
+    else:
+        priced, (beside, data) = _in_processes(rounds)
     rows = [row for problem_rows, _ in priced for row in problem_rows]
     return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
-def _beside(quick: bool) -> CaseAnswer:
+def _beside(quick: bool, rounds: int) -> CaseAnswer:
     """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
     claims about speed."""
     road = assemble(road_excited.scene())
-    rows, prices = ride.measure(quick, ROUNDS[quick], SHORTEST_TURN[True])
-    rounds, least, duration = 2 * ROUNDS[quick], 2 * SHORTEST_TURN[quick], road_excited.DURATION
+    rows, prices = ride.measure(quick, rounds, SHORTEST_TURN[True])
+    twice, least, duration = 2 * rounds, 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
-        "split": [] if quick else split.measure(ROUNDS[quick], SHORTEST_TURN[quick]),
-        "callback": {name: speed.callback_cost(road, duration, name, rounds, least) for name in ("RK4", "Euler")},
-        "real time": speed.real_time(road, duration, rounds, least),
+        "split": [] if quick else split.measure(rounds, SHORTEST_TURN[quick]),
+        "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
+        "real time": speed.real_time(road, duration, twice, least),
     }
     settings = dict.fromkeys(_at_1_ms(each) for each in road_excited.settings(quick) if each.method != "DVERK6")
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, make_problem: Make) -> CaseAnswer:
+def _priced(quick: bool, rounds: int, make_problem: Make) -> CaseAnswer:
     """The rows and the saved data of a problem."""
     problem = make_problem(quick)
-    measured = runner.measure(problem, quick, ROUNDS[quick], SHORTEST_TURN[quick])
+    measured = runner.measure(problem, quick, rounds, SHORTEST_TURN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _in_processes() -> tuple[list[CaseAnswer], CaseAnswer]:
+def _in_processes(rounds: int) -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
     the road, which takes long, is started before."""
     with processes(min(2, os.cpu_count() or 1)) as pool:
         first, *others = PROBLEMS + FULL_ONLY
-        road, beside = pool.submit(_priced, False, first), pool.submit(_beside, False)
-        priced = [*pool.map(partial(_priced, False), others[::-1])][::-1]
+        road, beside = pool.submit(_priced, False, rounds, first), pool.submit(_beside, False, rounds)
+        priced = [*pool.map(partial(_priced, False, rounds), others[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
