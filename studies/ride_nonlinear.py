@@ -78,7 +78,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": failed,
         "results": results,
-        "answer": _answer(answer),
+        "answer": _answer_of_ride(answer),
         "table": _table(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
         + _time_table(runs, answer, road, speed),
@@ -89,7 +89,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer(answer: Nonlinear) -> dict[str, Any]:
+def _answer_of_ride(answer: Nonlinear) -> dict[str, Any]:
     """Standard deviation and mean (SI) of each output at all speeds; None in place of a value that is not finite. For
     tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
     copies = list(answer.copies.values())

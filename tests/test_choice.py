@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 
 from models.advice.choice import choose
-from models.advice.choice.answer import Quantity, RunQuantities, added, less, relative, rounding, sizes
+from models.advice.choice.answer import (
+    Quantity,
+    RunQuantities,
+    difference_of_runs,
+    largest_relative_change,
+    rounding_floor,
+    scale_of_cases,
+    sum_of_differences,
+)
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
 from models.advice.choice.variants import Variants
 from models.advice.price.effects import price_list
-from models.advice.price.effects_text import as_dict, lines
+from models.advice.price.effects_text import as_dict, price_list_lines
 from models.core.errors import InputError
 from studies import choice as study
 from studies.command.asked import KNOWN_SYSTEMS, checked_study
@@ -38,16 +46,18 @@ def half_car(**more):
 
 def test_paths_are_compared_where_both_have_a_row_and_by_their_deviation():
     full, half = np.array([0.0, 2.0, 4.0, 6.0, 8.0]), np.array([0.0, 4.0, 9.0])
-    change = less((half,), (full,))
+    change = difference_of_runs((half,), (full,))
     assert change[0].tolist() == [0.0, 0.0, 1.0]
-    assert relative(change, sizes((full,))) == pytest.approx(np.sqrt(1.0 / 3.0) / np.sqrt(8.0))  # its deviation
-    assert added(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
+    assert largest_relative_change(change, scale_of_cases((full,))) == pytest.approx(
+        np.sqrt(1.0 / 3.0) / np.sqrt(8.0)
+    )  # its deviation
+    assert sum_of_differences(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
     with pytest.raises(InputError):
-        less((np.zeros(4),), (full,))
+        difference_of_runs((np.zeros(4),), (full,))
 
 
 def test_a_case_that_does_not_move_is_held_to_a_share_of_the_others():
-    assert sizes((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
+    assert scale_of_cases((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
 
 
 class Made(Variants):
@@ -110,7 +120,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     choice = found.choose()
     own = found.whole.variants.of().counts["calls"]
     assert choice.ended and choice.left_out == ("e00",) and choice.within_tolerance
-    assert choose.RUNS * own < choice.spent < (choose.RUNS + 10) * own and max(shares) == 1.0
+    assert choose.RUN_BUDGET * own < choice.spent < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
     assert not chooser(monkeypatch, quantity, names[:5]).choose().ended
 
 
@@ -188,8 +198,8 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert sizes(answer.of("a").cases)[0] < rounding(answer, "N") == pytest.approx(5e-6)
-    assert rounding(answer, "m") == 1e-15
+    assert scale_of_cases(answer.of("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert rounding_floor(answer, "m") == 1e-15
 
 
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
@@ -271,5 +281,5 @@ def test_prices_name_costs_and_changes_and_why_there_is_none():
     assert "gyro" in prices["gyro"].gone and prices["gyro"].changes[0].relative == 0.0
     assert prices["road"].changes[0].relative > 0.1 > max(c.relative for c in prices["pitch_spring"].changes)
     assert "wheel_forces" in prices["contact_points"].why and not prices["contact_points"].counts[0]
-    text = "\n".join(lines(found, ["pitch"]))
+    text = "\n".join(price_list_lines(found, ["pitch"]))
     assert "road" in text and "no price" in text and json.dumps(as_dict(found))

@@ -163,7 +163,7 @@ def test_the_kernel_from_curvatures_to_forces(cells):
     draw, how, elastic = np.random.default_rng(5), pointer(cells), PAIR.G / (1.0 - PAIR.nu)
     for ellipse in drawn(6, 4):
         small, large = sorted(10.0 ** draw.uniform(-1.0, 1.5, 2))
-        major, minor, approach = plain.hertz(small, large, elastic, ellipse.load)
+        major, minor, approach = plain.hertz_ellipse(small, large, elastic, ellipse.load)
         a, b = (major, minor) if draw.random() < 0.5 else (minor, major)
         A, B = (small, large) if a > b else (large, small)
         flexible = plain.flexibilities(a, b, PAIR.G, PAIR.nu)

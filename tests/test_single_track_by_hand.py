@@ -5,7 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from models.systems.single_track.equations import GRAVITY, Axle, Car, axle_force, forces, march, rates, reports
+from models.systems.single_track.equations import (
+    GRAVITY,
+    Axle,
+    Car,
+    axle_force,
+    forces,
+    march,
+    motion_rates,
+    motion_reports,
+)
 
 pytestmark = pytest.mark.grounds("closed form")
 CAR = Car(mass=1200.0, front=1.1, rear=1.6, inertia=1900.0, height=0.55, drag=0.4, brake=0.7, drive=0.2)
@@ -77,7 +86,7 @@ def test_a_steady_turn_on_linear_tyres_lasts_and_is_reported():
     loads = WEIGHT * CAR.rear / BASE, WEIGHT * CAR.front / BASE
     sides = [load * across / GRAVITY for load in loads]
     slips = [-across / (GRAVITY * stiffness) for stiffness in (11.0, 14.0)]
-    told = reports(coasting, front, rear, given, path)[-1]
+    told = motion_reports(coasting, front, rear, given, path)[-1]
     assert told == pytest.approx([across, *loads, *sides, *slips], rel=1e-9)
 
 
@@ -87,7 +96,7 @@ def test_rates_beside_a_steady_turn_are_those_of_the_linear_equations():
     front, rear = (axle(stiffness, ENDLESS) for stiffness in (11.0, 14.0))
     lateral, yawing = steady(11.0, 14.0, 0.02, speed)
     in_front, behind = 11.0 * WEIGHT * CAR.rear / BASE, 14.0 * WEIGHT * CAR.front / BASE
-    told = rates(coasting, front, rear, (lateral + aside, yawing), (0.02, speed, 0.0))
+    told = motion_rates(coasting, front, rear, (lateral + aside, yawing), (0.02, speed, 0.0))
     expected = (
         -(in_front + behind) * aside / (CAR.mass * speed),
         -(CAR.front * in_front - CAR.rear * behind) * aside / (CAR.inertia * speed),

@@ -28,9 +28,9 @@ class Report(NamedTuple):
     turning: np.ndarray
 
 
-REPORTED = len(Report._fields)
+REPORT_SIZE = len(Report._fields)
 """Numbers that a wheel reports."""
-TURNING = Report._fields.index("turning")
+TURNING_ROW = Report._fields.index("turning")
 """The row of the speeds of turning, for what runs in Python as well: there ``report_of`` gives no ``Report``."""
 
 
@@ -55,7 +55,7 @@ class PlaneMotion(NamedTuple):
 
 def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
     """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
-    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
+    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, turning.size)))
 
 
 class Wheels(NamedTuple):

@@ -72,7 +72,7 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def truck(vehicle: Truck, transfer: bool = True) -> Plane:
+def plane_of_truck(vehicle: Truck, transfer: bool = True) -> Plane:
     """``Plane`` of a two-axle vehicle; without ``transfer`` its wheel loads stay as they are at rest."""
     check_wheels(vehicle, vehicle.mass)
     none = np.zeros(4, dtype=np.int64)
@@ -124,7 +124,7 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
     return place, each("radius"), each("spin_inertia"), static, pitch * transfer, roll * transfer
 
 
-PAPER = Truck(
+PAPER_TRUCK = Truck(
     mass=5640.0,
     yaw_inertia=25000.0,
     height=1.2,

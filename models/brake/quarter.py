@@ -19,7 +19,7 @@ from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
 from models.tyre.tyre_table import Tables
 
-REGULAR = 0.1
+LEAST_SLIP_SPEED = 0.1
 """Speed (m/s) below which slip angles are those of this one: without a motion across there is none at all."""
 
 
@@ -104,7 +104,7 @@ def march(motion, torques, step, vehicle, path):
     rest, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)
-        used = step_on(motion, torques[n : n + 2], step, straight, REGULAR, vehicle, surfaces)
+        used = step_on(motion, torques[n : n + 2], step, straight, LEAST_SLIP_SPEED, vehicle, surfaces)
         if used < 0.0:
             return -2
         if used < step and rest < 0:

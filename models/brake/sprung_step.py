@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, FOLDED
-from models.brake.plane_records import TURNING, Wheels, report_of
+from models.brake.plane_records import TURNING_ROW, Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
@@ -292,7 +292,7 @@ def advance(motion, torques, step, steer, vehicle, course):
             hold(known, before, after, step, motion, vehicle)
             if not march(course.engine, q, v):
                 return GAVE_UP, time
-            turning[:] = motion.report[TURNING]
+            turning[:] = motion.report[TURNING_ROW]
         time += step
         status = ended(q, units, vehicle.plane.fold)
         if status != FINE:

@@ -73,7 +73,7 @@ class BrokenAssumption:
     law: str = ""
 
     @property
-    def _worst(self) -> str:
+    def _worst_value_text(self) -> str:
         """Text with the worst value in four digits and its unit; no power of ten below a million."""
         return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
 
@@ -83,7 +83,7 @@ class BrokenAssumption:
 
     def fact(self) -> str:
         """Sentence that the assumption was broken, for readers who know the assumption."""
-        return f"{self.says}; {self.where}, {self._time}, {self._worst}"
+        return f"{self.says}; {self.where}, {self._time}, {self._worst_value_text}"
 
     @property
     def _time(self) -> str:
@@ -95,24 +95,24 @@ class BrokenAssumption:
         """A full sentence for readers who do not know the assumption."""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst} "
+            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst_value_text} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 
 
-def broken(run: Result, assumption: Assumption) -> BrokenAssumption | None:
+def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | None:
     """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
     judged."""
     judged = [
         _longest_exceedance(run, assumption, where, values)
         if isinstance(values, Gaussian)
-        else _broken(run, assumption, where, np.asarray(values, float))
+        else _gaussian_violation(run, assumption, where, np.asarray(values, float))
         for where, values in assumption.watched(run).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
-def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
+def _gaussian_violation(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
     beyond = (values < a.least) | (values > a.most)
     if not beyond.any():
         return None
@@ -146,28 +146,28 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with a list of its assumptions and of those that it violates; its status names violations, too."""
     listed = list(assumptions)
-    breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]
+    breaches = [breach for breach in (worst_violation(run, each) for each in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
         {"assumed": [each.says for each in listed], "broken": [asdict(breach) for breach in breaches]}
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
-    _NOTED.get()(run)
+    _RESULT_OBSERVER.get()(run)
     return run
 
 
-_NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
+_RESULT_OBSERVER: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
 
 
 @contextmanager
 def watching(note: Callable[[Result], None]) -> Iterator[None]:
     """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
     inner one is called."""
-    before = _NOTED.set(note)
+    before = _RESULT_OBSERVER.set(note)
     try:
         yield
     finally:
-        _NOTED.reset(before)
+        _RESULT_OBSERVER.reset(before)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
@@ -188,7 +188,7 @@ def assumed_of(run: Result) -> list[str]:
 
 
 @contextmanager
-def breaches() -> Iterator[dict[str, BrokenAssumption]]:
+def collected_breaches() -> Iterator[dict[str, BrokenAssumption]]:
     """Context that collects the assumptions violated by the results checked inside: the worst violation of each, by
     name."""
     worst: dict[str, BrokenAssumption] = {}

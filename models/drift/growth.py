@@ -21,17 +21,17 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.pitch_plane import Parameters
 
-CUTOFF = 0.2
+FAST_PITCH_FREQUENCY = 0.2
 """Frequency (Hz) above which a pitch rate counts as fast: 1.3 rad/s, three times the largest growth rate of the study
 roads, for an average over a motion means something only where the error hardly grows meanwhile. Half of it or twice
 as much changes the growth rate of these roads by 1 to 3 %."""
-SERIES = 0.1
+SERIES_LIMIT = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
 LARGEST_EXPONENT = 710.0
 """From about this 2 lambda t on, sinh is beyond all numbers."""
 SMALLEST_POSITIVE = 1e-300
 """What counts as above 0 (rad^2/s^3, rad)."""
-MEDIAN = 0.6744897501960817
+MEDIAN_OF_NORMAL = 0.6744897501960817
 """Median of |x| of a normal x, by its standard deviation."""
 
 
@@ -79,7 +79,7 @@ def rigid_pitch(p: Parameters) -> RigidPitch:
     return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
 
 
-def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
+def high_passed(values: np.ndarray, period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
     """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
     cutoff.
 
@@ -101,13 +101,15 @@ def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np
     return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total
 
 
-def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> float:
+def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY) -> float:
     """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
     space."""
     return float(np.sqrt(rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff)).mean()))
 
 
-def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
+def sinh_law_rate(
+    pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+) -> np.ndarray:
     """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the
@@ -137,12 +139,12 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
         if not (np.asarray(given, dtype=float) >= 0.0).all():
             raise InputError("", name, None, "must be 0 or more, and a number")
     t, x = np.asarray(times, dtype=float), 2.0 * np.asarray(rate, dtype=float) * np.asarray(times, dtype=float)
-    small = np.minimum(np.abs(x), SERIES) ** 2
+    small = np.minimum(np.abs(x), SERIES_LIMIT) ** 2
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
-    large = np.where(np.abs(x) > SERIES, x, 1.0)
+    large = np.where(np.abs(x) > SERIES_LIMIT, x, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # beyond all numbers is infinite, at no rate and no time alike
         closed = np.where(large > LARGEST_EXPONENT, np.inf, 6 * (np.sinh(large) - large) / large**3)
-    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES, closed, series)
+    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_LIMIT, closed, series)
 
 
 def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, period: float) -> np.ndarray:
@@ -177,7 +179,7 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     ):
         if not (math.isfinite(value) and value >= least):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
-    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN) - math.log(intensity)) / 3.0  # without growth
+    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN_OF_NORMAL) - math.log(intensity)) / 3.0  # without growth
     if rate == 0.0:
         return math.exp(longest)
     most = math.log(2.0) + math.log(rate) + longest

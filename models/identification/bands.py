@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.identification.problem import Problem
-from models.identification.uncertainty import LEVEL, Uncertainty
+from models.identification.uncertainty import NORMAL_QUANTILE, Uncertainty
 
-SHARE = 0.95
+HELD_SHARE = 0.95
 """Of the residuals that the bands hold where they were made."""
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``reach`` holds SHARE of residuals."""
+    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``reach`` holds HELD_SHARE of residuals."""
 
     base: float
     share: float
@@ -35,7 +35,9 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
     model = ErrorModel(float(np.sqrt(base / sizes[0])), float(np.sqrt(share / sizes[1])), 1.0)
     size = model.half_width(predicted)
     floor = 1e-12 * float(np.abs(residuals).max() or 1.0)
-    return ErrorModel(model.base, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), SHARE)))
+    return ErrorModel(
+        model.base, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), HELD_SHARE))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ class Bands:
         return np.array([row[part].mean() for row, part in zip(values, used, strict=True)])
 
 
-def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
+def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
     """Bands for a stretch of measurement; ``problem`` is the fit's problem with the drive and the measurement of that
     stretch."""
     values = uncertainty.fit.values
@@ -78,4 +80,4 @@ def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) 
     slopes = problem.jacobian(values, problem.predicted)
     variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
     own = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
-    return Bands(problem, predicted, np.sqrt(own**2 + LEVEL**2 * np.clip(variance, 0.0, None)))
+    return Bands(problem, predicted, np.sqrt(own**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)))

@@ -43,7 +43,7 @@ class FilmedMotion:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ArrowStyle:
     """How arrows of one kind look: colour, metres per newton, and a round force (N) for the legend."""
 
     colour: Colour
@@ -84,7 +84,7 @@ class Stage:
     shapes: dict[str, list[PaintedSurface]]
     rest: Mapping[str, ArrayLike]
     camera: Camera
-    kinds: dict[str, Kind]
+    kinds: dict[str, ArrowStyle]
     curve: ForceCurve
     scenery: Callable[[float], list[PaintedSurface]] = lambda time: []
     magnified: float = 1.0
@@ -92,7 +92,7 @@ class Stage:
     struts: tuple[Strut, ...] = ()
 
 
-def gaps(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
+def largest_differences(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
     """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
     forces (N)."""
     places = [(place, second.places[name]) for name, place in first.places.items()]
@@ -115,7 +115,7 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
     for data.qpos[:] in coordinates:
         mujoco.mj_kinematics(model, data)
         frames.append([(data.xpos[i].copy(), data.xmat[i].copy()) for i in bodies.values()])
-    return _poses(frames, bodies)
+    return _poses_of_frames(frames, bodies)
 
 
 def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
@@ -127,10 +127,10 @@ def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates:
     for row in coordinates:
         mbs.systemData.SetODE2Coordinates(row)
         frames.append([(ask(kinds.Position), ask(kinds.RotationMatrix)) for ask in bodies.values()])
-    return _poses(frames, bodies)
+    return _poses_of_frames(frames, bodies)
 
 
-def _poses(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
+def _poses_of_frames(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
     """Position and rotation of every body over all frames."""
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)

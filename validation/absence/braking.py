@@ -33,16 +33,16 @@ def write(folder: Path) -> None:
 def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Numbers of components (lags, controllers, noisy signals, ...) in the model of a braking scene, and the path as
     bytes."""
-    from models.systems.braking.march import Braked
+    from models.systems.braking.march import BrakedVehicle
     from models.systems.braking.run import run
 
-    counts, march = dict[str, int](), Braked.run
+    counts, march = dict[str, int](), BrakedVehicle.run
 
-    def watched(vehicle: Braked, controller: Any, *more: Any) -> Any:
+    def watched(vehicle: BrakedVehicle, controller: Any, *more: Any) -> Any:
         counts.update(_counts_of_run(vehicle, controller))
         return march(vehicle, controller, *more)
 
-    with mock.patch.object(Braked, "run", watched):
+    with mock.patch.object(BrakedVehicle, "run", watched):
         path = run(scene, engine, procedure=STOP).detail
     return counts, path.states.tobytes()
 

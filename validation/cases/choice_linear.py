@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.ride_choice.activity import activity
+from models.advice.ride_choice.activity import activity_by_element
 from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
-from models.advice.ride_choice.screen import Screen, confirmed
+from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.systems import load
-from models.systems.ride.reduced_scene import Effect, without
+from models.systems.ride.reduced_scene import Effect, reduced_without
 from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.ride.drawn_rides import DrawnRide, drawn
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.ride.drawn_rides import DrawnRide, drawn_ride
 
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
 """The published half car."""
@@ -66,7 +66,7 @@ def judged(scene: DrawnRide, second: bool) -> Judged:
     by frequency responses."""
     chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
-    rest = whole.reduced(without(scene.scene, choice.left_out))
+    rest = whole.reduced(reduced_without(scene.scene, choice.left_out))
     two, deviation = Screen(whole.full, chooser.rows).identity(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return Judged(
@@ -85,7 +85,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     seeds = QUICK_SEEDS if quick else range(SCENES_DRAWN)
     choices = [
-        judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE)
+        judged(
+            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE
+        )
         for seed in seeds
     ]
     rows = [*_kept_rows(choices), _identity_row(choices), *_equal_rows(choices)]
@@ -111,7 +113,7 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
             share,
             "",
         ).within(1.0, 0.05, "asked: 95 of 100", "none"),
-        behaves(
+        behaviour_row(
             "choice_linear.honest",
             SYSTEM,
             "scenes that are reported as kept although another route shows that they are not",
@@ -202,7 +204,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
             "steps together",
             "closed form",
         ),
-        behaves(
+        behaviour_row(
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
@@ -262,7 +264,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
     alone, both = chooser.confirm(frozenset([mass])), chooser.confirm(frozenset([mass, damper]))
     step = chooser.cost(frozenset([mass, damper])).step / chooser.cost(frozenset()).step
     return [
-        behaves(
+        behaviour_row(
             "choice_linear.pair.alone",
             SYSTEM,
             "change of the body acceleration by wheels without mass under damped tyres",
@@ -271,7 +273,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
             "white noise reaches the body",
             "closed form",
         ),
-        behaves(
+        behaviour_row(
             "choice_linear.pair.chosen",
             SYSTEM,
             "both effects are left out at 3 %, each for the other's sake",
@@ -294,12 +296,12 @@ def _activity_rows() -> list[Row]:
     """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
     symmetric body."""
     chooser = _paper()
-    watts = activity(chooser.full_scenes[0])
+    watts = activity_by_element(chooser.full_scenes[0])
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     share = finite["inertia body ry"] / sum(finite.values())
     locked = next(effect for effect in chooser.effects if effect.name == "body ry")
-    rest = chooser.full_scenes[0].reduced(without(chooser.scene, [locked]))
-    change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
+    rest = chooser.full_scenes[0].reduced(reduced_without(chooser.scene, [locked]))
+    change = float(np.sqrt(exact_variances(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
         Observed(
             "choice_linear.activity",
@@ -349,7 +351,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
-    from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
@@ -369,7 +371,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     tolerance, saving = (np.array([each[key] for each in data["scenes"]]) for key in ("tolerance", "saving"))
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
-    heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
+    add_heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
     return [(FIGURE_TEXT, figure)]
 
 

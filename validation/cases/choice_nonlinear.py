@@ -10,8 +10,8 @@ from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
@@ -67,7 +67,7 @@ def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) ->
     return float(np.quantile(changes, UNSURE))
 
 
-@allowing("random scenes: whether what is left changes them as foretold is judged")
+@allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
@@ -105,7 +105,7 @@ def _refused() -> Row:
         Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
     except InputError as error:
         said = "refused" if "samples would tell" in error.allowed else error.allowed
-    return behaves(
+    return behaviour_row(
         "choice_nonlinear.refused",
         SYSTEM,
         f"choice for a ride of {FEWEST_COPIES} copies at a tolerance of {100 * FINE_TOLERANCE:g} %, where chance may "
@@ -210,7 +210,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Plot predicted over confirmed changes, and savings over the tolerance."""
-    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     ends = np.array([1e-4, 6.0])
@@ -241,7 +241,7 @@ def draw(data: Saved) -> Drawn:
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     left.legend(loc="upper left")
     right.legend(loc="best")
-    heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
+    add_heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
     return [(FIGURE_TEXT, figure)]
 
 

@@ -14,11 +14,19 @@ from typing import NoReturn
 
 import numpy as np
 
-from models.advice.choice.answer import Cases, RunQuantities, added, by_chance, less, relative, rounding
-from models.advice.choice.variants import Set, Variants
+from models.advice.choice.answer import (
+    Cases,
+    RunQuantities,
+    by_chance,
+    difference_of_runs,
+    largest_relative_change,
+    rounding_floor,
+    sum_of_differences,
+)
+from models.advice.choice.variants import EffectSet, Variants
 from models.core.errors import InputError
 
-FEW = 1 / 3
+LARGEST_SAMPLE_SHARE = 1 / 3
 """Share of a sampled quantity's mean square that one sample may have."""
 Changes = dict[str, Cases]
 """Differences of two runs, quantity by quantity."""
@@ -39,11 +47,11 @@ class Screen:
         self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
         for name, size in self.sizes.items():
-            if not (np.isfinite(size).all() and (size > rounding(full, quantities_by_name[name].unit)).any()):
+            if not (np.isfinite(size).all() and (size > rounding_floor(full, quantities_by_name[name].unit)).any()):
                 self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
         for name in self.sampled:
             share = max(float(case.max() / case.sum()) for case in self.full[name])
-            if share > FEW:  # no error could be told of it
+            if share > LARGEST_SAMPLE_SHARE:  # no error could be told of it
                 m = len(self.full[name][0])
                 why = f"by one sample of {m}, so that chance decides: ask for more or longer ones"
                 self._refuse(name, f"is made up to {100 * share:.0f} % {why}")
@@ -56,7 +64,9 @@ class Screen:
         if run is None or other_answer is None:
             return None
         try:
-            return {name: less(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities}
+            return {
+                name: difference_of_runs(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities
+            }
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
@@ -77,7 +87,7 @@ class Screen:
         pairs = [
             by_chance(change[name], self.full[name])
             if name in self.sampled
-            else (relative(change[name], self.sizes[name]), 0.0)
+            else (largest_relative_change(change[name], self.sizes[name]), 0.0)
             for name in self.quantities
         ]
         return np.array(pairs).T
@@ -93,13 +103,15 @@ class Screen:
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:
             return None
-        return {name: added(both[name], *(_minus(part[name]) for part in known)) for name in self.quantities}
+        return {
+            name: sum_of_differences(both[name], *(_negated(part[name]) for part in known)) for name in self.quantities
+        }
 
-    def ahead(self, sets: Iterable[Set]) -> None:
+    def ahead(self, sets: Iterable[EffectSet]) -> None:
         """Compute in advance the runs that ``change`` needs for these sets."""
-        self.variants.ahead((part, 1) for chosen in sets for part in _parts(chosen))
+        self.variants.ahead((part, 1) for chosen in sets for part in _sets_needed(chosen))
 
-    def change(self, omitted_effects: Set) -> Changes | None:
+    def change(self, omitted_effects: EffectSet) -> Changes | None:
         """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
@@ -109,13 +121,13 @@ class Screen:
             ]
         if None in parts:
             return self.between(self.variants.of(omitted_effects), self.variants.of())
-        return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
+        return {name: sum_of_differences(*(part[name] for part in parts if part)) for name in self.quantities}
 
-    def predicted(self, omitted_effects: Set) -> np.ndarray:
+    def predicted(self, omitted_effects: EffectSet) -> np.ndarray:
         """Predicted relative changes (quantities,) if a set of effects is left out, without the ``remainder``."""
         return self.shares(self.change(omitted_effects)) if omitted_effects else np.zeros(len(self.quantities))
 
-    def remainder(self, omitted_effects: Set) -> np.ndarray:
+    def remainder(self, omitted_effects: EffectSet) -> np.ndarray:
         """Estimate (quantities,) of changes of third and higher order: the second order, reduced by the ratio of the
         second order to the first.
         """
@@ -128,19 +140,19 @@ class Screen:
             return none  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
-    def of_step(self, omitted_effects: Set, times: int) -> np.ndarray:
+    def of_step(self, omitted_effects: EffectSet, times: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if times == 1:
             return np.zeros(len(self.quantities))
         return self.shares(self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects)))
 
 
-def _parts(omitted_effects: Set) -> list[Set]:
+def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
     """Sets of effects whose runs are needed to predict the changes for a set."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(few) for count in (1, 2) for few in combinations(sorted(omitted_effects), count)]
 
 
-def _minus(cases: Cases) -> Cases:
+def _negated(cases: Cases) -> Cases:
     return tuple(-case for case in cases)

@@ -16,14 +16,14 @@ RESPONSE_DIFFERENCE = 1e-7
 """Share of the largest response by which motions and the solve may differ at the frequency that is looked at."""
 
 
-class Read(NamedTuple):
+class OutputFactors(NamedTuple):
     """Factors of the requested outputs: of the motion q, q', q'' (q, n), and of heights and their rates (q, wheels)."""
 
     by_motion: tuple[np.ndarray, np.ndarray, np.ndarray]
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "Read":
+    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
         """Factors of the vehicle's outputs with these rows."""
         read, at = vehicle.read, list(rows)
         return cls(
@@ -36,7 +36,7 @@ class Response:
     """Transfer functions H (w, q, wheels) from road heights to outputs at frequencies (w,) in rad/s."""
 
     def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
-        self.vehicle, self.s, self.read = vehicle, 1j * omega, Read.of(vehicle.linear, rows)
+        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of(vehicle.linear, rows)
         self.by_heights = vehicle.linear.road_stiffness, vehicle.linear.road_damping
         self.motions = self._fractions()
         self.H = self._between(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
@@ -79,9 +79,9 @@ class Response:
         columns = sum((to_motions @ part) * modes.rates[:, None] ** i for i, part in enumerate(right))
         each = rows.T[:, :, None] * columns[:, None, :]
         whole = (fractions @ each.reshape(len(each), -1)).reshape(len(s), *each.shape[1:])
-        return np.asarray(whole + polynomial(self._rest(left, right), s))
+        return np.asarray(whole + polynomial(self._remaining_polynomial(left, right), s))
 
-    def _rest(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _remaining_polynomial(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Coefficients, by power of s, of the polynomial that remains besides the partial fractions: s^k (s - A)^-1 =
         A^k (s - A)^-1 + sum s^(k-1-j) A^j.
 

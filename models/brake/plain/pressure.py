@@ -14,7 +14,7 @@ from models.brake.brake import Brakes
 from models.brake.controller import APPLY, RELEASE, SLOW
 from models.brake.pressure import Air, Chambers
 
-ROUNDING = 1e-9
+STEP_END_SHARE = 1e-9
 """Share of a step at its ends in which a command counts as coming with the end."""
 
 
@@ -34,7 +34,9 @@ class Pressures:
         torques[0], steps = self.air.torque, len(torques) - 1
         step = self.sample / steps
         for n in range(steps):
-            within = [cut for cut in self._arrivals(n * step) if ROUNDING < cut / step < 1.0 - ROUNDING]
+            within = [
+                cut for cut in self._arrival_times(n * step) if STEP_END_SHARE < cut / step < 1.0 - STEP_END_SHARE
+            ]
             for now, then in pairwise([0.0, *within, step]):
                 self._press(self._reached(n * step + 0.5 * (now + then)), then - now)
             torques[n + 1] = self.air.torque
@@ -45,14 +47,14 @@ class Pressures:
         self._follow()
         torques[:] = self.air.torque
 
-    def _arrivals(self, time: float) -> list[float]:
+    def _arrival_times(self, time: float) -> list[float]:
         """Times (s) at which each command reaches the chambers, counted from ``time`` (s) in the latest sample."""
         latest = len(self.commands) - 1
         return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
     def _reached(self, time: float) -> np.ndarray:
         """The command that is effective in the chambers at a time (s) in the latest sample."""
-        known = [arrived for arrived, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
+        known = [arrived for arrived, late in zip(self.commands, self._arrival_times(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
     def _press(self, valves: np.ndarray, time: float) -> None:

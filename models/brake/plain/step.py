@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, FOLDED
-from models.brake.plain.road import in_row, under_wheels, ways
+from models.brake.plain.road import ground_paths, in_row, under_wheels
 from models.brake.plain.suspension import Suspension, TyreContact, WheelForces
-from models.brake.plain.tyre import Braked, Surface, WheelMotion, tyre
+from models.brake.plain.tyre import BrakedStep, Surface, WheelMotion, tyre
 from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
 
@@ -59,7 +59,7 @@ class Steps:
         """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step ended
         and the time (s)."""
         half, (q, v) = 0.5 * self.step, moving.state
-        under, middle = self._under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
+        under, middle = self._surfaces_under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
         if moving.lag is not None:
@@ -85,7 +85,7 @@ class Steps:
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
-        under = self._under(state, 0.0)
+        under = self._surfaces_under(state, 0.0)
         held = self._hold(moving, contacts, starts, under, none, self.step)
         return self.vehicle.acceleration(state[0], state[1], held), moving.turning
 
@@ -101,13 +101,13 @@ class Steps:
         is the sum of the yaw coordinates up to it."""
         return np.concatenate((all_values[:2], np.cumsum([all_values[2], *all_values[self.vehicle.turns]])))
 
-    def _under(self, state: np.ndarray, time: float) -> list[Surface]:
+    def _surfaces_under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
         plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
             mine = plane.unit == k
-            paths[mine] = ways(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
+            paths[mine] = ground_paths(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
@@ -125,11 +125,11 @@ class Steps:
         """Constant wheel forces over a time (s), from loads and motion at the contacts; fills the wheels' reports."""
         course = self.course
         for i, contact in enumerate(contacts):
-            motion = WheelMotion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
+            motion = WheelMotion(starts[i], moving.changes[i], contact.side_speed, contact.sliding, course.regular)
             if moving.lag is not None:
-                motion = replace(motion, across=moving.lag.across(i, max(motion.forwards, course.regular)))
+                motion = replace(motion, across=moving.lag.across(i, max(motion.forward_speed, course.regular)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
-            braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
+            braked = BrakedStep((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
             moving.report[i] = tyre(course.on.tables, surfaces[i], motion, contact.load, braked)
         spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
         return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
@@ -150,4 +150,4 @@ class Steps:
 
 def speeds(contacts: list[TyreContact]) -> np.ndarray:
     """Speeds (W,) of the wheels' centres along them (m/s)."""
-    return np.array([contact.passing for contact in contacts])
+    return np.array([contact.side_speed for contact in contacts])

@@ -46,17 +46,17 @@ class Fault(Strict):
 
 
 @dataclass
-class Faulty:
+class FaultyController:
     """A controller whose signals and commands pass through faults; a new one is made for every run."""
 
     inner: Controller
     faults: list[Fault]
-    _past: deque[np.ndarray] = field(init=False)
+    _past_signals: deque[np.ndarray] = field(init=False)
     _seen: np.ndarray | None = None
     _valves: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
+        self._past_signals = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for faulty signals; the commands themselves also get their faults."""
@@ -66,12 +66,12 @@ class Faulty:
         return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
 
     def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
-        self._past.append(wheels)
+        self._past_signals.append(wheels)
         seen = wheels.copy()
         for fault in here:
             for i in fault.of(wheels.size):
                 if fault.kind == "delayed":
-                    seen[i] = self._past[max(len(self._past) - 1 - (fault.samples or 0), 0)][i]
+                    seen[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
                 elif fault.kind == "lost" and self._seen is not None:
                     seen[i] = self._seen[i]
         self._seen = seen

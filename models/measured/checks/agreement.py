@@ -21,7 +21,9 @@ VEHICLE_ERROR = 0.03
 """Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
 LARGEST_DELAY, DELAY_SPACING = 0.25, 5e-4
 """s: delays looked at, and their spacing before the parabola through the best three."""
-TIMES = DELAY_SPACING * np.arange(-round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1)
+DELAYS_TRIED = DELAY_SPACING * np.arange(
+    -round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1
+)
 CHI_SQUARE_FALL = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR, SMALL_LEVER = 5e-4, 0.01, 0.01
@@ -30,10 +32,10 @@ EXPLAINED_SHARE = 0.35
 """Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
 in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
 a third of that."""
-FAULTS = 8
+MOST_FAULTS = 8
 """Faults looked for at the most."""
 SMALLEST_FLOAT = float(np.finfo(float).tiny)
-SMOOTHED = 9
+SMOOTHED_LINES = 9
 """Lines over which the unexplained spectrum is averaged."""
 
 
@@ -118,7 +120,7 @@ class Agreement:
         share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT)
         return np.sqrt(np.maximum(share, 0.0))
 
-    def typical(self) -> float:
+    def median_unexplained(self) -> float:
         """Median over the readings of the unexplained share."""
         return float(np.median(self.unexplained))
 
@@ -131,16 +133,16 @@ class Agreement:
     def weights(self) -> np.ndarray:
         """Weights of the frequencies: inverse of the smoothed unexplained power, so that a line that no force explains
         counts little."""
-        kernel = np.ones(SMOOTHED) / SMOOTHED
+        kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
         known = VEHICLE_ERROR**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
-        padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
+        padded = np.pad(self.left + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
         return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
         now, faults = self, list[MeasurementFault]()
-        while len(faults) < FAULTS:
+        while len(faults) < MOST_FAULTS:
             worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
             if worst is None:
                 break
@@ -160,7 +162,7 @@ class Agreement:
             return self._crossed(fault.signals)
         if fault.kind == "lever":
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
-            return replace(self, response=response + fault.size * self._levers(hubs))
+            return replace(self, response=response + fault.size * self._height_derivatives(hubs))
         turn = 2j * np.pi * self.frequencies
         wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
         forces, index = self._indices_of(fault.signals)
@@ -208,7 +210,7 @@ class Agreement:
     @cached_property
     def _delay_factors(self) -> np.ndarray:
         """Phase factors exp(i omega t) (t, f) of all trial delays t."""
-        return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
+        return np.exp(2j * np.pi * np.outer(DELAYS_TRIED, self.frequencies))
 
     def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of the readings less all other predictions with the group's prediction; power (f, k) of
@@ -217,7 +219,7 @@ class Agreement:
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
             rest = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ among
-            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power(response, among)
+            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power_spectrum(response, among)
         cross, power = np.zeros((2, *self.readings.shape), complex)
         response = self.response[:, pick]
         cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
@@ -231,7 +233,7 @@ class Agreement:
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
-        late = float(TIMES[best] + DELAY_SPACING * _vertex(*likely[best - 1 : best + 2]))
+        late = float(DELAYS_TRIED[best] + DELAY_SPACING * _parabola_vertex(*likely[best - 1 : best + 2]))
         turn = 2j * np.pi * self.frequencies
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
@@ -258,8 +260,8 @@ class Agreement:
         """Faults of hub moments that refer to a point above or below the hub: at one hub, at two, or equally at all."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
-            levers = self._levers(some)
-            power = float((weights * _power(levers, self.forces)).sum())
+            levers = self._height_derivatives(some)
+            power = float((weights * _power_spectrum(levers, self.forces)).sum())
             if not power > 0:
                 continue
             rest = self.between - self._expected_times_forces
@@ -269,7 +271,7 @@ class Agreement:
             if large and self._is_worth_correcting(self.without(fault), weights):
                 yield fault
 
-    def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
+    def _height_derivatives(self, hubs: tuple[str, ...]) -> np.ndarray:
         """Change of the response (f, k, c) per m of height of the point about which hub moments are given.
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
@@ -297,21 +299,21 @@ class Agreement:
 
     def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Pairs of channels whose signals may be exchanged with each other."""
-        for pair, other in self._exchanges():
+        for pair, other in self._channel_exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
                 yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
     def blind(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments along one axis whose exchange this recording could not reveal."""
-        alike = ((pair, other) for pair, other in self._exchanges() if len({s.component for s in pair}) == 1)
+        alike = ((pair, other) for pair, other in self._channel_exchanges() if len({s.component for s in pair}) == 1)
         return [
             pair
             for pair, other in alike
             if pair[0] in self.inputs and not other._certain_improvement(self, other.weights)
         ]
 
-    def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
+    def _channel_exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
         """Pairs of channels of one quantity with a common place or axis, each with the agreement after their
         exchange."""
         for side in (self.inputs, self.outputs):
@@ -390,11 +392,11 @@ def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) ->
     return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
 
 
-def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _power_spectrum(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
 
 
-def _vertex(left: float, middle_value: float, right: float) -> float:
+def _parabola_vertex(left: float, middle_value: float, right: float) -> float:
     """Position of the vertex of the parabola through three values at -1, 0 and 1."""
     bend = left - 2 * middle_value + right
     return 0.5 * (left - right) / bend if bend < 0 else 0.0

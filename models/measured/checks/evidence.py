@@ -7,19 +7,19 @@ from functools import cached_property, partial
 import numpy as np
 
 from models.measured.checks.agreement import Agreement, MeasurementFault
-from models.measured.checks.response import AXES, SensorResponse, number
-from models.measured.checks.spectra import Spectra, noise, spectra, windowed_means
+from models.measured.checks.response import AXIS_INDEX, SensorResponse, component_index
+from models.measured.checks.spectra import Spectra, cross_spectra, noise, windowed_means
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
-BAND = 1.0, 25.0
+COMPARED_BAND = 1.0, 25.0
 """Hz: above the drift of a free vehicle, below the bending of its body."""
 LEAST_MEAN_SHARE = 5e-4
 """Of a static load or of gravity: a mean that is smaller says nothing of unit and sign."""
-INERTIAL = ("acceleration", "angular rate", "angle")
+INERTIAL_QUANTITIES = ("acceleration", "angular rate", "angle")
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Evidence:
     @cached_property
     def inertial(self) -> tuple[Signal, ...]:
         """Accelerations, angular rates and angles measured at a known place on the vehicle."""
-        moving = [s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES]
+        moving = [s for s in self.recording.signals if s.quantity in INERTIAL_QUANTITIES and s.component in AXIS_INDEX]
         return tuple(s for s in moving if self.place(s) is not None)
 
     def vertical(self) -> dict[str, Signal]:
@@ -84,7 +84,7 @@ class Evidence:
         return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
-    def coarse(self) -> dict[Signal, float]:
+    def coarse_factors(self) -> dict[Signal, float]:
         """Ratio of recorded to true value for signals whose mean alone shows a wrong sign or unit.
 
         Means of vertical forces are compared with static loads, and those of vertical accelerometers with gravity.
@@ -108,8 +108,8 @@ class Evidence:
 
     @cached_property
     def _spectra(self) -> Spectra | None:
-        top = min(BAND[1], 0.4 / self.recording.period)
-        return spectra(self.recording, (*self.forces, *self.inertial), (BAND[0], top))
+        top = min(COMPARED_BAND[1], 0.4 / self.recording.period)
+        return cross_spectra(self.recording, (*self.forces, *self.inertial), (COMPARED_BAND[0], top))
 
     @cached_property
     def agreement(self) -> Agreement | None:
@@ -121,8 +121,10 @@ class Evidence:
         measured_spectra, c = self._spectra, len(self.forces)
         places = [place for s in self.inertial if (place := self.place(s)) is not None]
         response = SensorResponse(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
-        numbers = [number(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
-        forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
+        numbers = [component_index(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
+        forces, felt = (
+            np.array([self.coarse_factors.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial)
+        )
         return Agreement(
             measured_spectra.frequencies,
             self.forces,

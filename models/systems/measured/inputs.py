@@ -17,15 +17,15 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.piecewise import interpolate
 from models.core.signals import Smooth
-from models.core.smoothing import smoothed
-from models.measured.gaps import bridged
+from models.core.smoothing import low_passed
+from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
-from models.measured.signal import HUB, Signal
+from models.measured.signal import HUB_COMPONENTS, Signal
 from models.multibody.cut_kernel import FRAMES, WRENCH
 from models.vehicles.cut_vehicle import CutVehicle
 
-ANGLES = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
-WINDOW, OVERLAP = 4096, 96
+ANGLE_SIGNALS = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
+SPLINE_WINDOW, SPLINE_OVERLAP = 4096, 96
 """Answers in a stretch whose spline is made at once, and samples beside it: what is farther has weights below 1e-30."""
 
 
@@ -33,7 +33,8 @@ WINDOW, OVERLAP = 4096, 96
 class StepGrid:
     """Steps of a run on a recording's clock.
 
-    A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``skip`` samples apart.
+    A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``samples_per_output``
+    samples apart.
     """
 
     step: float
@@ -50,7 +51,7 @@ class StepGrid:
         return max(round(self.period / self.step), 1)
 
     @property
-    def skip(self) -> int:
+    def samples_per_output(self) -> int:
         """Number of samples of the recording from one output sample to the next."""
         return max(round(self.step / self.period), 1)
 
@@ -65,7 +66,7 @@ class StepGrid:
         """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), by linear interpolation."""
         return interpolate(samples, *self._samples_before(count))
 
-    def cubic(self, samples: np.ndarray, count: int) -> np.ndarray:
+    def cubic_rows(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
         samples before and the two after each."""
         at, u = self._samples_before(count)
@@ -95,14 +96,14 @@ class Inputs:
         used: dict[tuple[str, str, str], Signal] = {
             (s.quantity, s.component, s.at): s for s in reversed(recording.signals) if not s.check
         }
-        self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB]
-        self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLES]
+        self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB_COMPONENTS]
+        self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLE_SIGNALS]
         self.yaw = used.get(("angular rate", "yaw", vehicle.chassis))
         self._check()
         self._bridges = dict[Signal, tuple[np.ndarray, np.ndarray]]()
         for signal in (*self.hubs, *(self.angles[:2] if enforced else [])):
             if signal is not None:
-                values, gaps, findings = bridged(recording, signal)
+                values, gaps, findings = bridged_signals(recording, signal)
                 self.findings += findings
                 if gaps:
                     lost = np.concatenate([np.arange(gap.first, gap.end) for gap in gaps])
@@ -160,7 +161,7 @@ class Inputs:
         for hub, signals in zip(self.vehicle.hubs, zip(*[iter(self.hubs)] * WRENCH, strict=True), strict=True):
             if signals[2] is None:
                 raise InputError("", "files.channels", None, f"no vertical force is put in at the hub {hub!r}")
-            without = [name for signal, (name, *_) in zip(signals, HUB, strict=True) if signal is None]
+            without = [name for signal, (name, *_) in zip(signals, HUB_COMPONENTS, strict=True) if signal is None]
             if without:
                 text = f"{', '.join(without)} of the hub {hub} were not measured and are taken as 0."
                 self.findings.append(Finding("components", "doubt", hub, text))
@@ -180,8 +181,8 @@ class Prescribed:
         whole = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(whole).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
-        self.angles, self.grid = smoothed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
-        self._length = WINDOW * grid.skip
+        self.angles, self.grid = low_passed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
+        self._length = SPLINE_WINDOW * grid.samples_per_output
         self._per = int(self._length / grid.part)
 
     def rows(self, first: int, count: int) -> np.ndarray:
@@ -191,8 +192,8 @@ class Prescribed:
             window, offset = divmod(begin + done, self._per)
             taken = min(self._per - offset, count - done)
             stretch = window * self._length
-            start = max(stretch - OVERLAP, 0)
-            samples = self.angles[start : stretch + self._length + OVERLAP + 1]
+            start = max(stretch - SPLINE_OVERLAP, 0)
+            samples = self.angles[start : stretch + self._length + SPLINE_OVERLAP + 1]
             spline = Smooth(samples, period, derivatives=2, degree=5)
             rows = spline.sample((stretch - start) * period, self.grid.step / 2, self._per)
             out[done : done + taken] = rows[offset : offset + taken]

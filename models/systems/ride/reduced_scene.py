@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
-from models.core.scene_effects import without as without_own
+from models.core.scene_effects import scene_without as without_own
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import RideScene
@@ -76,7 +76,7 @@ class Effect:
     has_table: bool = False
 
 
-def illegal(omitted_effects: Iterable[Effect]) -> str:
+def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
     """Reason why these effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
@@ -90,7 +90,7 @@ def illegal(omitted_effects: Iterable[Effect]) -> str:
     return ""
 
 
-def without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
+def reduced_without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
     """The scene without these effects; effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:

@@ -21,7 +21,7 @@ from models.machine.compiled import compiled
 GRAVITY = 9.81
 LEAST_LOAD, LEAST_SHARE = 0.05, 0.1
 """Shares: of its static load that an axle keeps, and of its squared friction that is left to the side."""
-TURNED = 0.02
+TURNING_SLIP_WIDTH = 0.02
 """rad of slip angle over which friction goes from that of right turns to that of left ones."""
 
 
@@ -58,7 +58,7 @@ class Car(NamedTuple):
 @compiled
 def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
     """Side force (N, left positive) of an axle under a load (N) and a forward force (N), at a slip angle (rad)."""
-    grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
+    grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNING_SLIP_WIDTH))
     across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
     x = axle.stiffness * load * slip_angle / across
     bent = (1.0 + abs(x) ** axle.sharpness) ** (-1.0 / axle.sharpness)
@@ -88,7 +88,9 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
 
 
 @compiled
-def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
+def motion_rates(
+    car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]
+) -> tuple:
     """Rates of lateral velocity (m/s^2) and of yaw rate (rad/s^2)."""
     answer = forces(car, front, rear, motion, drive)
     return answer[0] / car.mass - drive[1] * motion[1], answer[1] / car.inertia
@@ -107,8 +109,8 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
     for i in range(len(inputs) - 1):
         here = inputs[i, 0], inputs[i, 1], inputs[i, 2]
         there = inputs[i + 1, 0], inputs[i + 1, 1], inputs[i + 1, 2]
-        w1, r1 = rates(car, front, rear, (w, r), here)
-        w2, r2 = rates(car, front, rear, (w + step * w1, r + step * r1), there)
+        w1, r1 = motion_rates(car, front, rear, (w, r), here)
+        w2, r2 = motion_rates(car, front, rear, (w + step * w1, r + step * r1), there)
         w += 0.5 * step * (w1 + w2)
         r += 0.5 * step * (r1 + r2)
         motion[i + 1] = w, r
@@ -116,7 +118,7 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
 
 
 @compiled
-def reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def motion_reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Channels (n, 7) of a motion: lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad),
     front first.
     """

@@ -10,7 +10,7 @@ from models.core.result import Result
 from models.rail.contact_table import PatchReport
 from models.systems.wheel_rail.scene import WheelRailScene
 
-WHEELS = ("right", "left")
+WHEEL_NAMES = ("right", "left")
 
 
 def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
@@ -19,7 +19,7 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     """
     listed = [_half_space(), _within_profiles(scene)]
     if yields(scene.bodies.wheel, scene.bodies.rail):
-        listed.append(_elastic())
+        listed.append(_elastic_assumption())
     if friction > 0.0:
         listed += [_small_creepage(), _slow_slip(scene.wheelset.speed)]
     return listed
@@ -35,7 +35,7 @@ def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = T
         placed = run.detail.placed
         return {
             f"{wheel} wheel": np.array([worst(map(value, getattr(position, wheel))) for position in placed])
-            for wheel in WHEELS
+            for wheel in WHEEL_NAMES
         }
 
     return watched
@@ -75,7 +75,7 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
     )
 
 
-def _elastic() -> Assumption:
+def _elastic_assumption() -> Assumption:
     return Assumption(
         "elastic",
         "the steel does not flow",

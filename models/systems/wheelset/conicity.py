@@ -18,7 +18,7 @@ from models.rail.wheelset import Wheelset
 from models.systems.wheelset.of_scene import wheelset_of
 from models.systems.wheelset.scene import ConicityTable, WheelsetScene
 
-CHANNELS = {
+CONICITY_CHANNELS = {
     "centre": ("m", "of the wave, to the right"),
     "equivalent": ("-", "equivalent conicity by EN 15302"),
     "harmonic": ("-", "conicity of the harmonic linearisation"),
@@ -71,7 +71,7 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
     values = [asdict(row) | {"wavelength": row.period * track} for row in rows]
     channels = {
         name: Channel("amplitude", np.array([row[name] for row in values]), unit, meaning)
-        for name, (unit, meaning) in CHANNELS.items()
+        for name, (unit, meaning) in CONICITY_CHANNELS.items()
     }
     axis = Channel("amplitude", np.array(asked.amplitudes), "m")
     doubts = [f"at {amplitude:g} m: {reason}" for amplitude, reason in why.items()]
@@ -142,7 +142,7 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
     }
 
 
-def lines(conicities: Conicities) -> list[str]:
+def conicity_lines(conicities: Conicities) -> list[str]:
     """Text with both conicities at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     told = [f"  equivalent conicity of {conicities.source}", head]

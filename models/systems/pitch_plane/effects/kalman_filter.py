@@ -58,13 +58,13 @@ CHANNELS = (
 )
 
 
-BANDWIDTH = 3.0
+PULL_BANDWIDTH = 3.0
 """Hz. Above the filter's own, (q/r)^(1/4) = 1.2 Hz at 0.2 % of force noise and an angle of 0.1 degree white at 1 kHz,
 so that the vehicle follows what the filter corrects; not more, because all that is faster in the estimate is the
 measurement's noise: the moment's rms grows from 0.4 % of I pitch'' at 3 Hz to 1.4 % at 8 Hz."""
 
 
-SURPRISE = 4.0
+INNOVATION_LIMIT = 4.0
 """Largest mean of the normalised innovation squared with which a run is made: errors twice as large as stated. A right
 filter has 1; one that is sure of a model with 5 % wrong inertia 1.1 to 1.3."""
 
@@ -86,7 +86,7 @@ class Parameters(Strict):
         default=0.0,
         zero=True,
     )
-    bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=BANDWIDTH)
+    bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=PULL_BANDWIDTH)
     damping_ratio: float = quantity("", "of the same", default=0.7)
     smoother: bool = Field(False, description="use all measurements for every time, later ones too")
 
@@ -102,14 +102,14 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
         guided,
-        outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
-        doubts=(*guided.doubts, *_doubts(p, guide)),
-        assumptions=(*guided.assumptions, _assumption(guide)),
+        outputs=(*guided.outputs, partial(_guiding_channels, guide, stiffness, damping)),
+        doubts=(*guided.doubts, *_filter_objections(p, guide)),
+        assumptions=(*guided.assumptions, _innovation_assumption(guide)),
     )
 
 
 @dataclass(frozen=True)
-class Guide:
+class GuidingEstimate:
     """Estimated pitch that a guided run follows, at times i ``period`` (s).
 
     states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
@@ -132,11 +132,11 @@ class Guide:
     consistency: Consistency
 
 
-_LATEST: dict[bytes, Guide] = {}
+_LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
 """The last guide, by all that it depends on: a check and a run per engine need it once."""
 
 
-def guide_of(assembly: Assembly, p: Parameters) -> Guide:
+def guide_of(assembly: Assembly, p: Parameters) -> GuidingEstimate:
     """The estimated pitch that a force-excited assembly follows; InputError for an unusable file, RunFailed from the
     filter.
     """
@@ -147,7 +147,7 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     signal = type(forces).__name__, forces.values, forces.period, forces.held
     kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, p))
-    if key not in _LATEST:
+    if key not in _LATEST_GUIDE:
         estimated = estimate(
             assembly,
             measured,
@@ -156,31 +156,31 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
             inertia_deviation=p.inertia_deviation,
             smoother=p.smoother,
         )
-        _LATEST.clear()
-        _LATEST[key] = _read(assembly, estimated, measured)
-    return _LATEST[key]
+        _LATEST_GUIDE.clear()
+        _LATEST_GUIDE[key] = _guiding_estimate(assembly, estimated, measured)
+    return _LATEST_GUIDE[key]
 
 
-def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> Guide:
-    from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
+def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> GuidingEstimate:
+    from models.systems.pitch_plane.pitch_filter import INERTIA_SHARE, KEPT_STATES, PITCH, PITCH_RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
-    deviations = np.sqrt(estimated.errors()[:, [PITCH, RATE], [PITCH, RATE]])
-    share, names = estimated.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    deviations = np.sqrt(estimated.errors()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
+    share, names = estimated.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
-    relative[KEPT] = estimated.states[:, :6].T
+    relative[KEPT_STATES] = estimated.states[:, :6].T
     moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
     fits = consistency(estimated.innovations, [names[column] for column in measurement.columns])
-    return Guide(
+    return GuidingEstimate(
         estimated.period,
         estimated.states,
-        estimated.states[:, [PITCH, RATE]],
+        estimated.states[:, [PITCH, PITCH_RATE]],
         deviations,
         share,
         share * moment,
         np.cumsum(estimated.used),
         np.cumsum(estimated.missed),
-        np.nancumsum(estimated.surprises),
+        np.nancumsum(estimated.normalised_innovations),
         fits,
     )
 
@@ -188,10 +188,13 @@ def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurem
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     """The measured columns of the file with their standard deviations; InputError for what the filter cannot use."""
     from models.core.time_series import read_time_series
-    from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
+    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
 
     scene, place = assembly.scene, "effects.kalman_filter"
-    known = (("pitch", RADIANS, PITCH, p.pitch_deviation), ("pitch_rate", RADIANS_PER_SECOND, RATE, p.rate_deviation))
+    known = (
+        ("pitch", RADIANS, PITCH, p.pitch_deviation),
+        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, p.rate_deviation),
+    )
     given = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
     if not given:
         raise InputError(scene.file, place, None, "needs pitch_deviation, rate_deviation or both: the columns to read")
@@ -215,20 +218,20 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     )
 
 
-def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+def _check_surprise(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
     """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
     mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
-    if mean > SURPRISE:
+    if mean > INNOVATION_LIMIT:
         raise InputError(
             assembly.scene.file,
             "effects.kalman_filter",
             None,
             f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
-            f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones",
+            f"what the deviations allow (at most {INNOVATION_LIMIT:g}): check sign and unit, or state larger ones",
         )
 
 
-def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
+def _filter_objections(p: Parameters, guide: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the filter that follow from its own innovations."""
     if guide.consistency.consistent:
         return ()
@@ -242,7 +245,7 @@ def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
     return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
 
 
-def _assumption(guide: Guide) -> Assumption:
+def _innovation_assumption(guide: GuidingEstimate) -> Assumption:
     """Assumption that the innovations' statistics are those of a correctly tuned filter."""
     return Assumption(
         "innovations",
@@ -260,7 +263,7 @@ def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
     return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.figures}
 
 
-def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+def _check_bandwidth(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
     """Refuse a bandwidth at which the moment reacts more slowly than the pitch diverges. Only vertical forces make it
     diverge.
     """
@@ -277,8 +280,8 @@ def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
         )
 
 
-def _channels(
-    guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
+def _guiding_channels(
+    guide: GuidingEstimate, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
 ) -> Channels:
     """Channels of the guiding moment and of the estimate that it follows, at the saved times."""
     grid = guide.period * np.arange(len(guide.values))

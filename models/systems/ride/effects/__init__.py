@@ -35,7 +35,7 @@ def _vehicle(scene: Any) -> Any:
     return vehicle_of(scene)
 
 
-def _equal(key: str) -> Callable[[Table, Any], None]:
+def _equal_heights_edit(key: str) -> Callable[[Table, Any], None]:
     """Return the edit that sets ``key`` of [road] so that wheels meet equal heights."""
 
     def leave_out(table: Table, scene: Any) -> None:
@@ -44,7 +44,7 @@ def _equal(key: str) -> Callable[[Table, Any], None]:
     return leave_out
 
 
-def _straighten(table: Table, scene: Any) -> None:
+def _straighten_curves(table: Table, scene: Any) -> None:
     """Replace the springs' curves by their slopes at rest."""
     table["vehicle"]["small_motion"] = True
 
@@ -89,7 +89,7 @@ TABLE = {
         {"bent springs": 1},
         modules=("models.ride.statistical_linearisation",),
         there=_omissions_of_sort("curves"),
-        leave_out=_straighten,
+        leave_out=_straighten_curves,
     ),
     "delay": Entry(
         "The delay from front to rear: every axle meets at once what the first one meets",
@@ -98,7 +98,7 @@ TABLE = {
         {"delays": 1},
         usual="delayed",
         there=_omissions_of_sort("delay"),
-        leave_out=_equal("front_rear"),
+        leave_out=_equal_heights_edit("front_rear"),
     ),
     "drag": _of_vehicle(
         "Drag of the air, which loads the axles by the speed", BY_SPEED, lambda scene: bool(_vehicle(scene).drags)
@@ -143,7 +143,7 @@ TABLE = {
         {"heights": 2},
         usual="modelled",
         there=_omissions_of_sort("second_track"),
-        leave_out=_equal("left_right"),
+        leave_out=_equal_heights_edit("left_right"),
     ),
     "side_forces": _of_vehicle(
         "Side forces of tyres, by slip angle", BY_SPEED, lambda scene: bool(_vehicle(scene).side_forces)
