@@ -36,7 +36,7 @@ class BicycleObservations:
     mean (2,) and standard deviations (2,). It is made for each speed that was not used in the choice; if all were used,
     each speed is predicted by a choice on all the others."""
 
-    seen: list[Observation]
+    observations: list[Observation]
     choice: Choice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
@@ -71,7 +71,7 @@ def observed_and_predicted(
 def observation_lines(answer: BicycleObservations, bicycle: Whipple, base: Control = EXPERIMENT_FEEDBACK) -> list[str]:
     """Text of the measured and predicted weave."""
     told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
-    for seen in answer.seen:
+    for seen in answer.observations:
         mean, deviation, model = seen.mean, seen.deviation, predicted_weave(bicycle, base, seen)
         each = [
             f"{sign * mean[i]:6.2f} +- {deviation[i]:4.2f}{sign * model[i]:17.2f} ({model[i] / mean[i] - 1.0:+5.0%})"
@@ -86,7 +86,7 @@ def observation_lines(answer: BicycleObservations, bicycle: Whipple, base: Contr
     told += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
     for name in SUSPECTED_PARAMETERS:
         calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
-        why = "no measured number depends on it" if name in choice.blind else calls
+        why = "no measured number depends on it" if name in choice.undetermined_parameters else calls
         told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
     for name, (ratio, chance) in choice.calls.items():
         if name not in SUSPECTED_PARAMETERS:

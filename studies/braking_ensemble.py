@@ -97,7 +97,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "table": table_of(options, scatters, tests),
         "answer": {
             "means": [{key: means[key].mean for key in KEPT_QUANTITIES} for means in scatters],
-            "p": {key: test.p for key, test in tests.items()},
+            "p": {key: test.p_value for key, test in tests.items()},
         },
     }
 
@@ -122,7 +122,7 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
             lines.append(
                 f"  difference of {KEPT_QUANTITIES[key]}: {test.difference:+.3f}, 95 % interval "
                 f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
-                f"p = {test.p:.2g}"
+                f"p = {test.p_value:.2g}"
             )
     return lines
 
@@ -154,7 +154,7 @@ def _figure(
         lw=0.9,
         label="by the square of the speed alone",
     )
-    said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
+    said = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
     legend_below(figure, histogram, cloud, columns=2)

@@ -44,25 +44,26 @@ class Options(Strict):
 @dataclass(frozen=True)
 class SingleEffect:
     """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
-    saving. saved: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
+    saving. work_ratio: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
     effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
-    saved: float
+    work_ratio: float
 
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """The choice of effects for one scene, with each effect taken alone. further: tolerances above which effects that
-    stay would be left out too. activity_of_element: energy activity (W) by element, where it has a closed form.
+    """The choice of effects for one scene, with each effect taken alone. further_tolerances: tolerances above which
+    effects that stay would be left out too. activity_of_element: energy activity (W) by element, where it has a closed
+    form.
     results: runs of the reduced scene, with their errors."""
 
     scene: Any
     engine: str
     choice: Choice
-    alone: list[SingleEffect]
-    further: dict[str, float]
+    single_effects: list[SingleEffect]
+    further_tolerances: dict[str, float]
     activity_of_element: dict[str, float]
     results: list[Result] = field(default_factory=list)
 
@@ -175,10 +176,14 @@ def choice_of_scene(
         choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
-        SingleEffect(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))
+        SingleEffect(
+            effect, chooser.teller.predicted_change(frozenset([effect])), none / chooser.work(frozenset([effect]))
+        )
         for effect in chooser.effects
     ]
-    return SceneChoice(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
+    return SceneChoice(
+        scene, engine, choice, alone, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
+    )
 
 
 def _linear_ride_choice(scene: Any) -> SceneChoice:
@@ -194,25 +199,27 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
         alone = [
-            SingleEffect(effect.name, abs(chooser.predicted(each)), calls / chooser.cost(each).calls)
+            SingleEffect(effect.name, abs(chooser.predicted_changes(each)), calls / chooser.cost(each).calls)
             for effect, each in singles.items()
         ]
-        further = {effect.name: change for effect, change in chooser.further(frozenset(linear.left_out)).items()}
+        further = {
+            effect.name: change for effect, change in chooser.change_if_left_out_too(frozenset(linear.left_out)).items()
+        }
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
-    before, after = round(linear.before.calls), round(linear.after.calls)
-    work = tuple(cost.work for cost in (linear.before, linear.before, linear.after))
+    before, after = round(linear.cost_before.calls), round(linear.cost_after.calls)
+    work = tuple(cost.work for cost in (linear.cost_before, linear.cost_before, linear.cost_after))
     choice = Choice(
         tuple(each.name for each in linear.candidates),
         tuple(each.name for each in linear.left_out),
         1,
-        abs(linear.predicted),
-        0.0 * linear.predicted,
-        abs(linear.confirmed),
-        0.0 * linear.predicted,
+        abs(linear.predicted_change),
+        0.0 * linear.predicted_change,
+        abs(linear.confirmed_change),
+        0.0 * linear.predicted_change,
         linear.within_tolerance,
         (before, before, after),
         work,
-        linear.rounds,
+        linear.confirmations,
         0,
         0.0,
     )
@@ -229,15 +236,19 @@ def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
         "stay": answered.staying_effects,
         "step times": choice.times,
         "errors": {
-            name: {part: float(getattr(choice, part)[i]) for part in ("predicted", "confirmed", "chance")}
+            name: {
+                "predicted": float(choice.predicted_change[i]),
+                "confirmed": float(choice.confirmed_change[i]),
+                "chance": float(choice.statistical_error[i]),
+            }
             for i, name in enumerate(answered.scene.quantities)
         },
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
-        "confirmations": choice.rounds,
-        "would matter no more above": answered.further,
+        "confirmations": choice.confirmations,
+        "would matter no more above": answered.further_tolerances,
         "would break an assumption": {
-            name: [asdict(each) for each in barred] for name, barred in choice.barred.items()
+            name: [asdict(each) for each in barred] for name, barred in choice.assumptions_barring.items()
         },
     }
 
@@ -249,11 +260,11 @@ def _save_effect_table(choice: SceneChoice, path: Path) -> None:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
-        for effect in choice.alone:
+        for effect in choice.single_effects:
             values = map(repr, effect.changes.tolist())
-            broken = "; ".join(each.says for each in choice.choice.barred.get(effect.effect, ()))
+            broken = "; ".join(each.says for each in choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
-                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.saved), broken]
+                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.work_ratio), broken]
             )
 
 
@@ -272,7 +283,7 @@ def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
     if (
         change > PREDICTION_SHARE * scene_choice.scene.tolerance
         or scene_choice.activity_of_element
-        or scene_choice.choice.ended
+        or scene_choice.choice.ended_early
     ):
         return f"would matter no more at a tolerance above {percent_text(change)}"
     return (
@@ -290,10 +301,10 @@ def choice_lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         f"    stay: {', '.join(scene_choice.staying_effects) or 'nothing'}",
     ]
     for i, name in enumerate(scene.quantities):
-        kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
+        kept = "kept" if choice.confirmed_change[i] + choice.statistical_error[i] <= scene.tolerance else "NOT KEPT"
         rows.append(
-            f"    {name}: {_change_text(choice.predicted[i], choice.remainder[i])} predicted, "
-            f"{_change_text(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
+            f"    {name}: {_change_text(choice.predicted_change[i], choice.prediction_remainder[i])} predicted, "
+            f"{_change_text(choice.confirmed_change[i], choice.statistical_error[i])} confirmed, tolerance "
             f"{100 * scene.tolerance:g} %: {kept}"
         )
     before, step, after = choice.calls
@@ -308,21 +319,21 @@ def choice_lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         )
     rows += [
         f"    {name} {_why_it_stays(change, scene_choice)}"
-        for name, change in sorted(scene_choice.further.items(), key=lambda item: item[1])
+        for name, change in sorted(scene_choice.further_tolerances.items(), key=lambda item: item[1])
     ]
     rows += [
         f"    {name} stays; without it an assumption would be broken: {each.fact()}"
-        for name, breaches in choice.barred.items()
+        for name, breaches in choice.assumptions_barring.items()
         for each in breaches
     ]
-    if choice.ended:
+    if choice.ended_early:
         rows.append(f"    the search ended at the calls of {RUN_BUDGET} runs of the scene: larger sets were not tried")
     if choice.sample_factor:
         rows.append(
             f"    chance alone stands in the way of more: {choice.sample_factor:.2g} times as many samples would tell"
         )
     rows += misleading_activities(scene_choice)
-    worst = float((choice.confirmed + choice.chance).max())
+    worst = float((choice.confirmed_change + choice.statistical_error).max())
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
@@ -330,7 +341,7 @@ def misleading_activities(choice_of: SceneChoice) -> list[str]:
     """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
     quantity."""
     total, rows = sum(value for value in choice_of.activity_of_element.values() if np.isfinite(value)), []
-    for effect in choice_of.alone:
+    for effect in choice_of.single_effects:
         share = choice_of.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
         for name, change in zip(choice_of.scene.quantities, effect.changes, strict=True):
             if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
@@ -348,7 +359,9 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     shown = [(choice, False) for choice in choices] + [
         (choice, True) for choice in choices if choice.activity_of_element
     ]
-    heights = [1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.alone), 4)) for choice, active in shown]
+    heights = [
+        1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.single_effects), 4)) for choice, active in shown
+    ]
     figure, axes = subplots(
         len(shown), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.5), squeeze=False, height_ratios=heights
     )
@@ -367,7 +380,8 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     from models.drawing.figures import DARK, PALE, REJECTED_COLOUR, SMALL_TEXT
 
     shown = sorted(
-        scene_choice.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST_CHANGE).max())
+        scene_choice.single_effects,
+        key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST_CHANGE).max()),
     )
     y = np.arange(len(shown))
     for i, name in enumerate(scene_choice.scene.quantities):
@@ -383,7 +397,9 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     for row, effect in zip(y, shown, strict=True):
         if not np.isfinite(effect.changes).all():
             axis.text(HIGHEST_CHANGE, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
-    barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.barred]
+    barred = [
+        row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.assumptions_barring
+    ]
     if barred:
         place = np.full(len(barred), HIGHEST_CHANGE)
         axis.plot(place, barred, "x", color=REJECTED_COLOUR, ms=7, mew=1.6, label="would break an assumption")

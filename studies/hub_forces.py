@@ -38,7 +38,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "failed": {},
         "answer": comparison.answer(),
         "results": comparison.results,
-        "doubts": list(comparison.measurement.tilt.doubts),
+        "doubts": list(comparison.measurement.tilt.objections),
         "table": _table(scene, comparison),
     }
 
@@ -48,7 +48,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
     off = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
     lines = [
-        f"  forces in the frame {scene.forces.frame!r}; innovations squared {tilt.surprise:.2f} times",
+        f"  forces in the frame {scene.forces.frame!r}; innovations squared {tilt.normalised_innovation:.2f} times",
         f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
         f"{'moments rms':>16}   {damage}",
         f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
@@ -67,7 +67,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
         )
     if not known:
         lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
-    lines += [f"  doubt: {text}" for text in tilt.doubts]
+    lines += [f"  doubt: {text}" for text in tilt.objections]
     lines += [f"  {name}: {text}" for name, text in comparison.failed.items()]
     if len(comparison.runs) > len(METHOD_OF_RUN):
         lines.append(f"  engines before drift-off: {comparison.engines_apart():.1e}")

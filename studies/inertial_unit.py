@@ -144,7 +144,12 @@ def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: C
         units,
         [
             Assumption(
-                "small angle errors", says, remedy, watch_function(units="angle_error"), "rad", most=LARGEST_ANGLE_ERROR
+                "small angle errors",
+                says,
+                remedy,
+                watch_function(units="angle_error"),
+                "rad",
+                upper_limit=LARGEST_ANGLE_ERROR,
             )
         ],
     )

@@ -73,7 +73,7 @@ class Source:
     truth: dict[str, np.ndarray] = field(default_factory=dict)
     gyro: np.ndarray | None = None
     quality: Quality | None = None
-    ways: dict[str, RecoveredMotion] = field(default_factory=dict)
+    recovered_motions: dict[str, RecoveredMotion] = field(default_factory=dict)
     run: Result | None = None
 
     @property
@@ -184,20 +184,20 @@ def _recover_motions(source: Source, array: SensorArray, options: Options, p: Pa
     suspect, readings = source.quality.suspect, source.readings
     moved = partial(recovered_motion, period=source.period, start=source.start, zeroed=options.zeroed)
     if suspect:
-        source.ways["all sensors, integrated"] = moved(array, readings)
+        source.recovered_motions["all sensors, integrated"] = moved(array, readings)
         readings = readings[:, [name != suspect for name in array.names]]
         array = sensor_array({name: place for name, place in p.positions().items() if name != suspect})
-    source.ways["integrated"] = moved(array, readings)
+    source.recovered_motions["integrated"] = moved(array, readings)
     if p.deviation > 0:
         held, _ = filter_rates(
             spin_from_readings(array, readings), source.period, np.array(source.start.rates), p.deviation
         )
-        source.ways["rates held by w w^T"] = moved(array, readings, rates=held)
+        source.recovered_motions["rates held by w w^T"] = moved(array, readings, rates=held)
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
-        source.ways["rates from the gyro"] = moved(array, readings, rates=turning)
+        source.recovered_motions["rates from the gyro"] = moved(array, readings, rates=turning)
     cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
-    source.ways["high-passed"] = moved(array, readings, cut_offs=cut_offs)
+    source.recovered_motions["high-passed"] = moved(array, readings, cut_offs=cut_offs)
 
 
 def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
@@ -208,7 +208,10 @@ def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
 def _save_motions(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
     returned."""
-    stem, ways = Path(source.name).stem, {way: _compared_values(moved) for way, moved in source.ways.items()}
+    stem, ways = (
+        Path(source.name).stem,
+        {way: _compared_values(moved) for way, moved in source.recovered_motions.items()},
+    )
     for way, moved_values in ways.items():
         columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
         write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
@@ -221,7 +224,7 @@ def _save_motions(scene: Scene, source: Source, folder: Path, options: Options) 
     saved = result(scene, channels, axes, engine=source.name)
     assert source.quality is not None
     record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
-    with_assumptions(saved, assumptions(record, source.ways["integrated"]))
+    with_assumptions(saved, assumptions(record, source.recovered_motions["integrated"]))
     if scene.error:
         beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
         not_estimated(saved, f"noise and mounts err most, and {beside}")
@@ -234,7 +237,7 @@ def _numbers_of_ways(source: Source) -> dict[str, Any]:
     largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
     assert source.quality is not None
     ways = {}
-    for way, moved in source.ways.items():
+    for way, moved in source.recovered_motions.items():
         errors = {name: values - source.truth.get(name, 0.0) for name, values in _compared_values(moved).items()}
         ways[way] = {name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()}
     told = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
@@ -312,7 +315,7 @@ def _figure(source: Source, results: Results, path: Path) -> None:
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
     for axis in axes.values():
         axis.xaxis.set_tick_params(labelbottom=True)
-    ways = {way: _compared_values(motion) for way, motion in source.ways.items()}
+    ways = {way: _compared_values(motion) for way, motion in source.recovered_motions.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
         _plot_motions(
             axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name

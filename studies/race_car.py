@@ -84,13 +84,13 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     )
     others = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
     draw(chosen, others, scene.title, folder / "race_car.png")
-    solved = chosen.known.fit
+    solved = chosen.uncertainty.fit
     predicted = SceneModel(second, [each.name for each in solved.problem.parameters], "").result(solved.values)
     predicted.save(folder / "predicted.nc")
     answer = error_ratios(chosen)
-    answer["identified"] = as_dict(chosen.known)
+    answer["identified"] = as_dict(chosen.uncertainty)
     answer["simpler vehicles"] = {
-        name: dict(zip(AIMED_ERRORS, each.bands.relative(), strict=True)) for name, each in others.items()
+        name: dict(zip(AIMED_ERRORS, each.bands.relative_error(), strict=True)) for name, each in others.items()
     }
     answer["residuals"] = residual_correlations(chosen)
     return {
@@ -100,7 +100,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
         "answer": answer,
         "results": {"prediction": predicted},
         "table": [
-            *identification_lines(chosen.known),
+            *identification_lines(chosen.uncertainty),
             *_result_lines(chosen, others),
             *_unmet_aims(answer["residuals"]),
         ],
@@ -172,9 +172,13 @@ def _with_values(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrac
 def error_ratios(identified: Identified) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
     samples; half-width of the bands to the error."""
-    sizes = np.array([channel.size for channel in identified.known.fit.problem.channels])
+    sizes = np.array([channel.size for channel in identified.uncertainty.fit.problem.channels])
     crossed = np.sqrt(np.mean(identified.cross_validation_errors**2, axis=1)) / sizes
-    inside, width, relative = identified.bands.inside(), identified.bands.width(), identified.bands.relative()
+    inside, width, relative = (
+        identified.bands.share_inside(),
+        identified.bands.width(),
+        identified.bands.relative_error(),
+    )
     return {
         name: {
             "error": float(relative[k]),
@@ -194,7 +198,7 @@ def _result_lines(chosen: Identified, identified: dict[str, Identified]) -> list
             f"{each['half-width by error']:>12.2f}{each['error between parts']:>9.1%}"
         )
     for name, each in identified.items():
-        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, each.bands.relative(), strict=True))
+        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, each.bands.relative_error(), strict=True))
         table.append(f"  {name}: {errors}")
     return table
 
@@ -202,8 +206,8 @@ def _result_lines(chosen: Identified, identified: dict[str, Identified]) -> list
 def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
     """For each channel, correlations of the residual and of its magnitude with accelerations, speed and braking of the
     car."""
-    problem = identified.known.fit.problem
-    model = problem.model.result(identified.known.fit.values)  # type: ignore[attr-defined]
+    problem = identified.uncertainty.fit.problem
+    model = problem.model.result(identified.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
     speed = np.interp(clock, model.times, model.detail.speed)

@@ -35,7 +35,7 @@ def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, 
     vehicles = {"chosen": chosen, **identified}
     for i, (name, each) in enumerate(vehicles.items()):
         at = np.arange(len(names)) + 0.25 * i
-        axes[-1].bar(at, 100.0 * each.bands.relative(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
+        axes[-1].bar(at, 100.0 * each.bands.relative_error(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
     axes[-1].set_xticks(np.arange(len(names)) + 0.25, names)
     axes[-1].set(ylabel="error [% of rms]", title="What simpler vehicles lose")
     axes[-1].legend()

@@ -38,7 +38,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
         "folder": str(folder),
         "failed": _failure_reasons(exam),
         "page": str(page),
-        "results": {exam.chosen: result},
+        "results": {exam.chosen_run: result},
         "verdicts": {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()},
         "effects": [str(consequence) for consequence in exam.consequences],
         "findings": findings_as_dicts(finding for finding in exam.findings if finding.weight != "note"),
@@ -51,7 +51,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 def _failure_reasons(examination: Examination) -> dict[str, str]:
     """Reasons why the command ends with code 1: errors in the recording, or the failure of the run whose results were
     to be saved."""
-    if examination.stopped:
+    if examination.is_stopped:
         count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
     return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}
@@ -62,7 +62,7 @@ def _force_sizes(examination: Examination) -> dict[str, Any]:
     sizes = dict[str, Any]()
     for answer, counted in examination.counted.items():
         assert examination.outcome is not None
-        largest = float(np.abs([counted.least, counted.largest_load]).max())
+        largest = float(np.abs([counted.smallest_load, counted.largest_load]).max())
         sizes[answer.name] = {
             "unit": answer.unit,
             "max": largest,

@@ -192,7 +192,7 @@ def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) 
             np.where(np.isfinite(values), values, np.nanmean(values)), 1 / recording.period, nperseg=2048
         )
         axis.loglog(f[1:], np.sqrt(density[1:]), lw=0.9, label=signal.name)
-        stated = evidence.claimed.get(signal.name)
+        stated = evidence.stated_noise.get(signal.name)
         if stated:
             axis.axhline(
                 stated * np.sqrt(2 * recording.period), color=LOUD_COLOUR, ls="--", label=f"stated for {signal.name}"
@@ -254,8 +254,8 @@ def drift_figure(examination: Examination, path: Path) -> Path:
         for name, (times, values) in curves.items():
             label, colour = RUN_STYLES[name]
             panel.plot(*thinned_curve(times, np.degrees(values)), color=colour, label=label, lw=1.0)
-        if examination.drift is not None and examination.chosen != FREE_RUN and examination.chosen in curves:
-            about = np.interp(examination.drift.times, *curves[examination.chosen])
+        if examination.drift is not None and examination.chosen_run != FREE_RUN and examination.chosen_run in curves:
+            about = np.interp(examination.drift.times, *curves[examination.chosen_run])
             spread = examination.drift.deviations[:, ("roll", "pitch").index(angle)]
             label = "free run as predicted, 1 standard deviation"
             bounds = np.degrees(about - spread), np.degrees(about + spread)
@@ -301,7 +301,7 @@ def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> P
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEEL_COLOURS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
-        right.plot(np.maximum(counts.pairs, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
+        right.plot(np.maximum(counts.pairs_of_range, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
     for panel, title, what in (
         (left, "level crossings, upwards", "level"),
         (right, "range pairs of at least", "range"),
@@ -325,7 +325,7 @@ def overlay_figure(
         near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
         for values, colour, width, label in (
             (measured, PALE, 2.6, "measured"),
-            (computed, RUN_STYLES[examination.chosen][1], 0.8, "computed"),
+            (computed, RUN_STYLES[examination.chosen_run][1], 0.8, "computed"),
         ):
             left.plot(*thinned_curve(times, values), color=colour, lw=width, label=label)
             right.plot(times[near], values[near], color=colour, lw=width)

@@ -58,12 +58,18 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         weights=[finding.weight for finding in examination.findings],
         used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],
         effects={
-            finding: f" {each}." for each in examination.consequences if each.section for finding in [each.finding]
+            finding: f" {each}."
+            for each in examination.consequences
+            if each.section_force
+            for finding in [each.finding]
         },
         figures=_page_figures(examination, folder),
         limits={"disagrees": LARGEST_DISAGREEMENT, "force": FORCE_LIMITS, "damage": DAMAGE_LIMITS},
         forces=_forces(examination, examination.outcome, folder) if examination.outcome is not None else None,
-        sizes=[math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf for each in examination.compared],
+        sizes=[
+            math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf
+            for each in examination.channel_comparisons
+        ],
         files=[
             (source, examination.scene.path(source.file, f"files.{i}.file"))
             for i, source in enumerate(examination.scene.files)
@@ -86,8 +92,10 @@ def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
     ]
     if examination.runs:
         figures["drift"] = draw.drift_figure(examination, folder / "drift.png")
-    if examination.outcome is not None and examination.compared:
-        shown = [each for each in examination.compared if each.signal.check] or examination.compared
+    if examination.outcome is not None and examination.channel_comparisons:
+        shown = [
+            each for each in examination.channel_comparisons if each.signal.check
+        ] or examination.channel_comparisons
         figures["checks"] = draw.overlay_figure(
             examination, examination.outcome, shown[:FORCES_DRAWN], folder / "checks.png"
         )
@@ -100,7 +108,7 @@ def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> 
     moving = {
         answer: counts
         for answer, counts in examination.counted.items()
-        if counts.largest_load - counts.least > NEGLIGIBLE_CHANGE
+        if counts.largest_load - counts.smallest_load > NEGLIGIBLE_CHANGE
     }
     first, inside = list(moving)[:FORCES_DRAWN], set(examination.rig.places.connectors)
     return {
@@ -114,6 +122,6 @@ def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> 
         "parts": [
             {a: counts for a, counts in moving.items() if (a.section in inside) is part} for part in (True, False)
         ],
-        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen),
+        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen_run),
         "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),
     }

@@ -42,9 +42,9 @@ class EffectAlone:
     be left out (else empty)."""
 
     effect: Effect
-    predicted: np.ndarray
-    confirmed: np.ndarray
-    illegal: str
+    predicted_change: np.ndarray
+    confirmed_change: np.ndarray
+    refusal_reason: str
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
@@ -73,7 +73,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         chooser = Chooser.of(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
-        further = chooser.further(frozenset(choice.left_out))
+        further = chooser.change_if_left_out_too(frozenset(choice.left_out))
         alone = [_effect_alone(chooser, effect) for effect in chooser.effects]
         watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
@@ -104,16 +104,18 @@ def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Res
 
 def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
     single = frozenset([effect])
-    return EffectAlone(effect, chooser.predicted(single), chooser.solved(single), refusal_reason(single))
+    return EffectAlone(
+        effect, chooser.predicted_changes(single), chooser.changes_by_modes(single), refusal_reason(single)
+    )
 
 
 def _answer_of_choice(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
     """Plain values of a ride's choice: its effects, their changes and the saving."""
     columns = {
-        "predicted": choice.predicted,
-        "confirmed": choice.confirmed,
-        "between speeds": choice.between,
-        "parameters off": choice.off,
+        "predicted": choice.predicted_change,
+        "confirmed": choice.confirmed_change,
+        "between speeds": choice.change_between_speeds,
+        "parameters off": choice.change_with_parameters_off,
     }
     errors = {
         name: {key: float(values[i]) for key, values in columns.items()} for i, name in enumerate(scene.quantities)
@@ -123,12 +125,12 @@ def _answer_of_choice(scene: RideScene, choice: RideChoice, further: dict[Effect
         "stay": [effect.name for effect in choice.candidates if effect not in choice.left_out],
         "errors": errors,
         "kept": choice.within_tolerance,
-        "states": [choice.before.states, choice.after.states],
-        "step": [choice.before.step, choice.after.step],
-        "step limit": list(choice.stable),
-        "calls": [choice.before.calls, choice.after.calls],
+        "states": [choice.cost_before.states, choice.cost_after.states],
+        "step": [choice.cost_before.step, choice.cost_after.step],
+        "step limit": list(choice.stable_steps),
+        "calls": [choice.cost_before.calls, choice.cost_after.calls],
         "said": list(choice.said),
-        "confirmations": choice.rounds,
+        "confirmations": choice.confirmations,
         "would matter no more above": {effect.name: change for effect, change in further.items()},
     }
 
@@ -148,10 +150,10 @@ def _save_effect_table(
     results, counts = runs
     told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in single_effects]}
     changes = {
-        part: np.array([getattr(each, part) for each in single_effects]).reshape(-1, len(scene.quantities))
+        part: np.array([getattr(each, f"{part}_change") for each in single_effects]).reshape(-1, len(scene.quantities))
         for part in ("predicted", "confirmed")
     }
-    effects, why = [each.effect.name for each in single_effects], [each.illegal for each in single_effects]
+    effects, why = [each.effect.name for each in single_effects], [each.refusal_reason for each in single_effects]
     channels = {part: Channel(("effect", "quantity"), values, "1") for part, values in changes.items()}
     channels |= {"left_out": Channel("effect", told["left out"]), "not_alone_because": Channel("effect", why)}
     axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
@@ -160,7 +162,7 @@ def _save_effect_table(
         channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
         {name: Channel(name, values) for name, values in axes.items()},
         engine="reference",
-        counts={"confirmations": choice.rounds} | counts,
+        counts={"confirmations": choice.confirmations} | counts,
     )
     derived_result(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
     told |= {
@@ -193,7 +195,7 @@ def choice_figure(
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
         for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
-            changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*single_effects, choice)]))
+            changes = 100 * abs(np.array([getattr(row, f"{part}_change")[i] for row in (*single_effects, choice)]))
             shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST_CHANGE), LOWEST_CHANGE, HIGHEST_CHANGE)
             above.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
     above.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
@@ -241,7 +243,15 @@ def _table(
     stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
     lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
-        told = map(percent_text, (choice.predicted[i], choice.confirmed[i], choice.between[i], choice.off[i]))
+        told = map(
+            percent_text,
+            (
+                choice.predicted_change[i],
+                choice.confirmed_change[i],
+                choice.change_between_speeds[i],
+                choice.change_with_parameters_off[i],
+            ),
+        )
         lines.append(
             "  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
             "5 % off; tolerance {}".format(name, *told, tolerance)
@@ -249,25 +259,25 @@ def _table(
     lines += saving_lines(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [
-        f"    {single.effect.name}: {', '.join(map(percent_text, single.confirmed))}"
-        + (f" ({single.illegal})" if single.illegal else "")
+        f"    {single.effect.name}: {', '.join(map(percent_text, single.confirmed_change))}"
+        + (f" ({single.refusal_reason})" if single.refusal_reason else "")
         for single in single_effects
     ]
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"
         matters = "  {} would matter no more at a tolerance above {:.3g} %"
         lines.append((idle if change <= (scene.tolerance or 0) else matters).format(effect.name, 100 * change))
-    worst = float(max(abs(choice.off).max(), abs(choice.between).max()))
+    worst = float(max(abs(choice.change_with_parameters_off).max(), abs(choice.change_between_speeds).max()))
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines
 
 
 def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
     """Text on steps and calls at equal accuracy before and after the choice."""
-    before, after = choice.before, choice.after
+    before, after = choice.cost_before, choice.cost_after
     lines = [
         f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
         f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
-        f"second of motion (stable up to {1e3 * choice.stable[0]:.3g} ms)"
+        f"second of motion (stable up to {1e3 * choice.stable_steps[0]:.3g} ms)"
     ]
     if not choice.left_out:
         return [*lines, "  nothing that may be left out saves calls"]
@@ -275,7 +285,8 @@ def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
         *lines,
         "  without what is left out, changes and steps together keep the same in steps of "
         f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
-        f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}",
+        f"equal accuracy (stable up to {1e3 * choice.stable_steps[1]:.3g} ms); states {before.states} "
+        f"-> {after.states}",
         f"  {SCENE_FILE_NAME} beside the results runs what is left",
     ]
 

@@ -268,8 +268,10 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
     left = answer.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
-        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color=GREY, label="slopes at rest (small motion)")
-        told = "statistical linearisation" + (", tyres on the road" if answer.lifts else "")
+        axis.plot(
+            answer.speeds, factor * answer.small_motion[:, i], "--", color=GREY, label="slopes at rest (small motion)"
+        )
+        told = "statistical linearisation" + (", tyres on the road" if answer.tyres_may_lift else "")
         deviation, poor = factor * answer.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
         axis.plot(answer.speeds, deviation, color=CORRELATION_COLOURS[1], label=told)
         told = "no longer good by its own measure"
@@ -284,7 +286,7 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
                 color=VERMILION,
                 markersize=4,
                 capsize=3,
-                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.lifts else ""),
+                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.tyres_may_lift else ""),
             )
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()

@@ -192,12 +192,17 @@ def _drift_off_rows(
     """Predicted and measured drift-off times (s) by source; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
-        measured, quartiles = runs[name].passes(options.angle) if name in runs else None, None
+        measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
             times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
             measured, *quartiles = [time if math.isfinite(time) else None for time in times]
         rows.append(
-            {"source": name, "predicted": curve.passes(options.angle), "measured": measured, "quartiles": quartiles}
+            {
+                "source": name,
+                "predicted": curve.passing_time(options.angle),
+                "measured": measured,
+                "quartiles": quartiles,
+            }
         )
     return rows
 
@@ -266,7 +271,7 @@ def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
     taken for as rough as the run.
     """
-    time = curve.passes(options.angle)
+    time = curve.passing_time(options.angle)
     start = min(options.wanted, curve.times[-1] if time is None else time)
     size = float(curve.size[: np.searchsorted(curve.times, start) + 1].max())
     longer = pitch_variance(options.wanted, rate, 1.0) / pitch_variance(start, rate, 1.0)

@@ -42,5 +42,5 @@ def _element_rows(listed: list[Element]) -> list[dict[str, Any]]:
     return [
         {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": value_text(each.value)}
         for each in listed
-        if each.says and not (is_word(each.value) and each.value[0] == "on")
+        if each.is_nonzero and not (is_word(each.value) and each.value[0] == "on")
     ]

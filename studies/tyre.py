@@ -46,7 +46,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     tables = tables_of(scene)
-    answer = {name: table.figures(options.load) for name, table in tables.items()}
+    answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
         name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
         for name, table in tables.items()

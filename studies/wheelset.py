@@ -133,7 +133,7 @@ def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]
     first = next((linear_run.critical_speed for linear_run in linear.values()), None)
     return lines + [
         f"    {f'eigenvalues of {engine}':<34}"
-        + _speed(linear_run.critical_speed, linear_run.why, first if k else None)
+        + _speed(linear_run.critical_speed, linear_run.no_critical_reason, first if k else None)
         for k, (engine, linear_run) in enumerate(linear.items())
     ]
 

@@ -82,14 +82,12 @@ def _colour_bars(figure: Figure) -> list[Colorbar]:
 def _empty(axes) -> bool:
     """Whether nothing is drawn in a panel, or nothing but zeros."""
     if not axes.axison:
-        return not (axes.text_columns or axes.images or axes.patches)
+        return not (axes.texts or axes.images or axes.patches)
     lines = [np.asarray(line.get_ydata(), float) for line in axes.lines if line.get_transform() == axes.transData]
     curves = any(np.isfinite(values).any() and (values[np.isfinite(values)] != 0).any() for values in lines)
     points = any(np.isfinite(np.asarray(line.get_xdata(), float)).any() for line in axes.lines)
     flat = lines and max(map(len, lines)) > 2 and not curves
-    others = (
-        axes.text_columns or axes.images or axes.patches or axes.collections or (axes.child_axes and not axes.lines)
-    )
+    others = axes.texts or axes.images or axes.patches or axes.collections or (axes.child_axes and not axes.lines)
     return not others and (bool(flat) or not points)
 
 

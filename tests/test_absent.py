@@ -79,7 +79,7 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
         march(engine, model(scene({}, 20, folder), engine))
     short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     assert long.frames == short.frames <= 50
-    assert abs(long.memory - short.memory) < 2000
+    assert abs(long.peak_bytes - short.peak_bytes) < 2000
     assert short.callbacks == long.callbacks == 0
 
 

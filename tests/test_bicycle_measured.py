@@ -53,7 +53,7 @@ def test_the_suspects_that_made_the_recordings_are_called_for(folder):
     seen = observations(folder)
     choice = ranked_suspects(BICYCLE, EXPERIMENT_FEEDBACK, seen, SUSPECTS)
     assert {*choice.best_subset.names} == {"friction", "speed_gain", "speed_bias"}
-    assert choice.blind == ("encoder_gain",)
+    assert choice.undetermined_parameters == ("encoder_gain",)
     told = dict(zip(choice.best_subset.names, choice.best_subset.values, strict=True))
     for name in told:
         assert told[name] == pytest.approx(getattr(TRUE, name), abs=0.03)

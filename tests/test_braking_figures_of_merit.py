@@ -70,7 +70,7 @@ def test_locks_are_told_by_wheel_above_a_speed_alone():
     locked = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 1]], bool)
     table = merit.lock_table(np.full(5, 0.1), locked, np.array([9.0, 8.0, 7.0, 6.0, 1.0]))
     assert table.time == pytest.approx([0.3, 0.3]) and table.share == pytest.approx([0.75, 0.75])
-    assert table.longest == pytest.approx([0.2, 0.3])
+    assert table.longest_lock == pytest.approx([0.2, 0.3])
 
 
 def test_welch_is_that_of_a_worked_example():
@@ -79,5 +79,5 @@ def test_welch_is_that_of_a_worked_example():
     assert found.t == pytest.approx(2.0 / np.sqrt(1.15)) and found.freedoms == pytest.approx(19.19, abs=0.01)
     from scipy.stats import ttest_ind_from_stats
 
-    assert found.p == pytest.approx(ttest_ind_from_stats(5.0, 2.0, 10, 7.0, 3.0, 12, equal_var=False).pvalue)
+    assert found.p_value == pytest.approx(ttest_ind_from_stats(5.0, 2.0, 10, 7.0, 3.0, 12, equal_var=False).pvalue)
     assert scatter_of(np.array([1.0, 3.0])).deviation == pytest.approx(np.sqrt(2.0))

@@ -53,7 +53,7 @@ def test_the_train_is_drawn_where_its_hinges_are():
 @pytest.mark.full
 def test_adhesion_of_every_axle_of_a_train_is_that_of_its_tyres():
     found = utilisation(build(TABLE), "ice")
-    k = np.array([found.k.front, found.k.rear, *found.k.trailer])
+    k = np.array([found.adhesion.front, found.adhesion.rear, *found.adhesion.trailer])
     # friction peaks at 0.172; Annex 13 takes 0.010 or 0.015 of the truck's other axle off, which does not roll so here
     assert k.size == 4 and ((k > 0.14) & (k < 0.172)).all() and k[2:].min() > 0.155
     assert k.min() <= found.k_vehicle <= k.max() and 0.75 < found.epsilon < 1.05

@@ -60,7 +60,7 @@ def test_forces_give_the_accelerations_of_the_mass_matrix_by_energy(plane):
     forces = random.normal(0.0, 1e4, n)
     accelerations = forces.copy()
     solve(mass, plane, accelerations)
-    free = slice(2 if plane.hooked else 0, n)
+    free = slice(2 if plane.has_prescribed_hook else 0, n)
     expected = np.linalg.solve(plain_mass(q, plane)[free, free], forces[free])
     assert not right.any() and accelerations[free] == pytest.approx(expected, rel=1e-7)
 

@@ -26,7 +26,7 @@ def scene(speed, duration, **tables):
 
 def locked_friction(surface):
     """Of a locked wheel of the truck, by wheel."""
-    return np.array([named_tyre(surface).figures(float(load))["locked"] for load in PLANE.static])
+    return np.array([named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static])
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -72,7 +72,7 @@ def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
     _, rates, _ = given.output(np.interp(STEPS, [0.0, ramp], [0.0, angle]), STEPS)
     wanted = yaw_response(STEPS, rates, ramp / 2.0)
     assert found.time == pytest.approx(wanted.time, abs=1e-4)  # by linear crossing within samples of 5.5 ms
-    assert found.steady == pytest.approx(wanted.steady, rel=1e-6)
+    assert found.steady_rate == pytest.approx(wanted.steady_rate, rel=1e-6)
 
 
 def test_a_ramp_turns_less_than_a_step_and_a_step_of_one_knot_the_same():

@@ -64,8 +64,15 @@ class Made(Variants):
     """Variants whose quantity is a given function of what is left out and of the step."""
 
     def __init__(self, function, effects):
-        self.function, self.names, self.calls, self._kept, self._costs, self._broken = function, effects, 0, {}, {}, {}
-        self._ready = {}
+        self.function, self.names, self.calls, self._kept, self._work_of_set, self._assumptions_broken = (
+            function,
+            effects,
+            0,
+            {},
+            {},
+            {},
+        )
+        self._computed_in_advance = {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
         self.system = type(
             "System",
@@ -96,16 +103,18 @@ def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out(
         return 100.0 + x + 0.1 * x**2
 
     screen = Screen(Made(quantity, ("a", "b", "c")), ["q"])
-    assert screen.predicted(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
-    assert screen.remainder(frozenset("ab"))[0] == 0.0  # run itself
+    assert screen.predicted_change(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
+    assert screen.higher_order_estimate(frozenset("ab"))[0] == 0.0  # run itself
     second, first = 0.2 * (2.0 + 3.0 + 6.0), 6.0 + 0.1 * 14.0
-    assert screen.remainder(frozenset("abc"))[0] == pytest.approx(second**2 / first / 100.0)
+    assert screen.higher_order_estimate(frozenset("abc"))[0] == pytest.approx(second**2 / first / 100.0)
 
 
 def test_a_pair_is_found_of_which_one_alone_ruins(monkeypatch):
     ruined = {frozenset("a"): 300.0, frozenset("ab"): 101.0, frozenset("b"): 104.5, frozenset(): 100.0}
     choice = chooser(monkeypatch, lambda left_out, times: ruined[left_out], ("a", "b")).choose()
-    assert choice.left_out == ("a", "b") and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.01)
+    assert (
+        choice.left_out == ("a", "b") and choice.within_tolerance and choice.confirmed_change[0] == pytest.approx(0.01)
+    )
 
 
 def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
@@ -119,9 +128,9 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     found.progress = shares.append
     choice = found.choose()
     own = found.whole.variants.of().counts["calls"]
-    assert choice.ended and choice.left_out == ("e00",) and choice.within_tolerance
-    assert choose.RUN_BUDGET * own < choice.spent < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
-    assert not chooser(monkeypatch, quantity, names[:5]).choose().ended
+    assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
+    assert choose.RUN_BUDGET * own < choice.calls_of_search < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
+    assert not chooser(monkeypatch, quantity, names[:5]).choose().ended_early
 
 
 def test_what_steps_change_is_told_by_shorter_ones_that_have_the_same_times(monkeypatch):
@@ -146,7 +155,7 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     own.whole.variants._kept.clear()
     monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
     choice = own.choose()
-    assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.005)
+    assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed_change[0] == pytest.approx(0.005)
 
 
 def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
@@ -158,7 +167,10 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     own.system.WINDOWED = True
     monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: own)
     found = Chooser(None, "", ["q"], 0.05)
-    assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.step_factor == 2
+    assert (
+        found._longest_allowed(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4
+        and found.step_factor == 2
+    )
 
 
 def hub_forces(**more):
@@ -205,7 +217,11 @@ def test_what_only_rounds_does_not_move():
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
     asked = draw_scene("pitch-plane", 3)
     choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
-    assert choice.within_tolerance and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
+    assert (
+        choice.within_tolerance
+        and (choice.confirmed_change <= asked.tolerance).all()
+        and choice.calls[2] < choice.calls[0]
+    )
 
 
 def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
@@ -255,9 +271,12 @@ def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
     for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
         monkeypatch.setattr("time.process_time", clock)
         found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
-    one, two = (replace(choice, seconds=(), predicted=0, remainder=0, confirmed=0, chance=0) for choice in found)
+    one, two = (
+        replace(choice, seconds=(), predicted_change=0, prediction_remainder=0, confirmed_change=0, statistical_error=0)
+        for choice in found
+    )
     assert one == two and found[0].seconds != found[1].seconds
-    assert np.array_equal(found[0].confirmed, found[1].confirmed)
+    assert np.array_equal(found[0].confirmed_change, found[1].confirmed_change)
 
 
 def test_work_is_calls_times_what_each_goes_through():

@@ -97,7 +97,7 @@ def end(processes):
 def secure(tmp_path_factory):
     """Address of the cluster, its scheduler, and the folder with its certificate."""
     if shutil.which("openssl") is None:
-        pytest.samples_per_output("openssl makes the certificate")
+        pytest.skip("openssl makes the certificate")
     import dask.config
     from distributed import Client
 

@@ -273,7 +273,11 @@ def test_curvatures_give_what_axes_do():
 def test_blocks_join_to_the_whole_table():
     Path("cases.csv").write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n")
     parts = list(table_blocks(Path("cases.csv"), (BY_AXES,), 3))
-    assert [len(part.lines) for part in parts] == [3, 3, 2] and [list(part.wrong) for part in parts] == [[], [], [1]]
+    assert [len(part.lines) for part in parts] == [3, 3, 2] and [list(part.faulty_rows) for part in parts] == [
+        [],
+        [],
+        [1],
+    ]
     joined = np.concatenate([part.values["a"] for part in parts])
     assert joined[:7] == pytest.approx(1e-3 * np.arange(1, 8)) and np.isnan(joined[7])
 

@@ -137,7 +137,7 @@ def test_tyre_damping_under_a_road_of_first_order_leaves_wheel_and_load_without_
     assert np.isinf(other.variance[4:]).all()
     np.testing.assert_allclose(found.variance[:4], other.variance[:4], rtol=1e-10)
     quick = variance_sweep(lambda speed: vehicle, {"track": walk(0.3)}, [20.0])
-    assert tuple(quick.status[0, 0]) == found.status and not quick.direct
+    assert tuple(quick.status[0, 0]) == found.status and not quick.direct_counts
 
 
 def test_a_free_heading_turns_into_a_lateral_walk():
@@ -289,7 +289,7 @@ def test_the_fast_route_equals_the_direct_one(truck):
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles
     quick = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
     slow = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
-    assert quick.direct == {} and slow.direct == {ASKED_FOR: 10}
+    assert quick.direct_counts == {} and slow.direct_counts == {ASKED_FOR: 10}
     assert quick.outputs[-1] == "frame centre Wd" and (quick.status == slow.status).all()
     told = slow.variance > 1e-20  # below, an output is zero by symmetry
     np.testing.assert_allclose(quick.variance[told], slow.variance[told], rtol=1e-10)
@@ -298,7 +298,7 @@ def test_the_fast_route_equals_the_direct_one(truck):
 def test_the_fast_route_says_when_it_is_not_taken(free):
     plain, _, road = free
     found = variance_sweep(lambda speed: plain, {"3": road}, [20.0])
-    assert sum(found.direct.values()) == 1 and "parallel" in next(iter(found.direct))
+    assert sum(found.direct_counts.values()) == 1 and "parallel" in next(iter(found.direct_counts))
     np.testing.assert_array_equal(
         found.variance[0, 0], stationary_covariance(vehicle_with_road(plain, road, 20.0)).variance
     )

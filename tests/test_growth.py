@@ -108,7 +108,7 @@ def test_rigid_vehicle_about_the_common_centre_of_mass():
     matrix = np.array([[mass, -c], [-c, p.I + p.m1 * p.b**2 + p.m2 * p.a**2]])
     for forces in ([1.0, 0.0], [0.0, 1.0]):
         pushed = np.linalg.solve(matrix, [-sum(forces), p.b * forces[0] - p.a * forces[1]])
-        assert rigid.moment(np.array([forces]))[0] / rigid.total == pytest.approx(pushed[1], rel=1e-12)
+        assert rigid.moment(np.array([forces]))[0] / rigid.total_inertia == pytest.approx(pushed[1], rel=1e-12)
 
 
 @pytest.mark.parametrize("rule", ["linear", "held"])
@@ -124,7 +124,7 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
         for wheel in range(2):
             values = np.zeros_like(assembly.input.values)
             values[sample, wheel] = 20.0
-            table = replace(path, forces=replace(assembly.input, values=values)).inputs
+            table = replace(path, forces=replace(assembly.input, values=values)).forces_at_stages
             stages = [table] * 3 if rule == "held" else [table[0:-1:2], table[1::2], table[2::2]]
             pushes = np.stack(stages, axis=1).reshape(-1, 1, 2)
             responses.append(path.carry_errors(np.zeros((1, 8)), pushes)[1][-1, 0])

@@ -131,9 +131,9 @@ def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
     errors = [error_model(row - channel.values, row) for row, channel in zip(predicted, problem.channels, strict=True)]
     fresh = problem_of(begun(scene), measured(scene, 7), KEYS, low_pass=5.0)
     answer = error_bands(fresh, known, errors)
-    assert np.all(answer.inside() > 0.9) and np.all(answer.inside() <= 0.995)
+    assert np.all(answer.share_inside() > 0.9) and np.all(answer.share_inside() <= 0.995)
     assert np.all(answer.width() < 2.5)
-    assert np.all(replace(answer, half_width=0.25 * answer.half_width).inside() < 0.7)
+    assert np.all(replace(answer, half_width=0.25 * answer.half_width).share_inside() < 0.7)
 
 
 def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_profile_of_a_straight_problem_is_a_parabola() -> None:
     closed = np.linalg.inv(np.array([[400.0, times.sum()], [times.sum(), (times**2).sum()]])) * 0.01
     assert known.deviations == pytest.approx(np.sqrt(np.diag(closed)), rel=0.4)  # long-run scores scatter
     rises = likelihood_profile(known, 1)
-    assert rises.quadratic
+    assert rises.is_quadratic
     assert rises.rise == pytest.approx(rises.parabola, rel=0.02)
 
 

@@ -229,7 +229,7 @@ def test_a_measurement_at_its_own_rate_lies_at_its_own_times(folder):
     states = free(folder)
     slow = Measurement(states[::4, [3]], 4 * PERIOD, (PITCH,), (ANGLE,))
     found = estimate(assembly_of_scene(scene(folder)), slow, 16.0)
-    assert found.used.sum() == len(slow.values) and (found.used[::4] == 1).all()
+    assert found.used_values.sum() == len(slow.values) and (found.used_values[::4] == 1).all()
     np.testing.assert_allclose(found.states[:, PITCH], states[:, 3], atol=1e-9)  # all data are true
     fine = build("reference", assembly_of_scene(scene(folder)), Settings("RK4", 1e-3, DURATION)).run().states
     fast = estimate(assembly_of_scene(scene(folder)), Measurement(fine[:, [3]], 1e-3, (PITCH,), (ANGLE,)), 16.0)

@@ -160,7 +160,7 @@ def test_header_says_what_the_kernel_does():
 def test_c_program_calls_the_kernel(tmp_path):
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
-        pytest.samples_per_output("no C compiler here")
+        pytest.skip("no C compiler here")
     library = tmp_path / "example.so"
     subprocess.run(
         [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o", library, EXAMPLE, "-lm"],

@@ -39,7 +39,7 @@ def test_nodes_are_the_published_ones():
     assert stacked(RATIOS[:, None], np.array([0.0, 0.25, 0.5])) == pytest.approx(np.moveaxis(TABLE, 1, 2), rel=1e-14)
     folder = Path(os.environ.get("TWINRIG_DATA", ""))
     if not (folder / "kalker_coefficients.csv").is_file():
-        pytest.samples_per_output("TWINRIG_DATA does not name the folder of the published table")
+        pytest.skip("TWINRIG_DATA does not name the folder of the published table")
     published = np.loadtxt(folder / "kalker_coefficients.csv", delimiter=",", skiprows=2)
     found = stacked(np.round(RATIOS, 5)[:, None], np.array([0.0, 0.25, 0.5]))
     assert np.abs(found.reshape(-1, 4) / published[:, 2:] - 1).max() < 1e-5  # the file's a/b has five decimals

@@ -388,4 +388,4 @@ def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_
     forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)
     followed = TiltFilter(ridden.vehicle, "hub", own.period, Deviations(forces, (1.75e-3, 5e-3), 10.0))
     followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
-    assert [named in text for text in followed.doubts()] == [True] * bool(bias)
+    assert [named in text for text in followed.objections()] == [True] * bool(bias)

@@ -215,7 +215,7 @@ def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     found = compare(Recording(own.recording.signals, columns, own.recording.period), outcome, signal, answer)
     assert found.damage == pytest.approx({slope: 1.1**slope for slope in (3.0, 5.0, 8.0)})
     assert [band.error / band.measured for band in found.bands] == pytest.approx([0.1] * len(found.bands))
-    assert found.explained == pytest.approx(0.99) and found.trusted == np.inf
+    assert found.explained_variance == pytest.approx(0.99) and found.trusted_time == np.inf
     assert found.offset == pytest.approx(np.mean(true) * (1 - 1 / 1.1))
 
 

@@ -133,10 +133,12 @@ def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:
     line = np.interp(at[gone], at[~gone], hop[~gone])
     error = np.std((found - hop)[gone])
     assert error < 0.5 * np.std(line - hop[gone])
-    assert 0.5 * error < np.mean([gap.doubt for gap in said]) < 3 * error  # the largest in a gap, not the mean one
+    assert (
+        0.5 * error < np.mean([gap.largest_deviation for gap in said]) < 3 * error
+    )  # the largest in a gap, not the mean one
     assert (found[~gone] == hop[~gone]).all()
     kept, (gap,) = filled_samples(np.where((at > 99) & (at < 200), np.nan, hop), PERIOD, 0.03)
-    assert np.isnan(kept[100:200]).all() and np.isnan(gap.doubt)
+    assert np.isnan(kept[100:200]).all() and np.isnan(gap.largest_deviation)
 
 
 @pytest.mark.grounds("closed form")
@@ -147,8 +149,8 @@ def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, t
     fine = np.arange(30) / 4
     assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
     inputs = Inputs(recording_of_samples(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
-    start, end = inputs.around(0, 4), inputs.around(inputs.recording.count - 4, 4)
-    assert (inputs.around(5, 4) == inputs.wrenches(4, 7)).all()
+    start, end = inputs.wrenches_with_neighbours(0, 4), inputs.wrenches_with_neighbours(inputs.recording.count - 4, 4)
+    assert (inputs.wrenches_with_neighbours(5, 4) == inputs.wrenches(4, 7)).all()
     assert np.allclose(start[0], 2 * start[1] - start[2]) and len(start) == len(end) == 7
 
 
@@ -179,13 +181,13 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     law = own.angle_variance(deviation, PERIOD, hub.times[1:])
     assert np.abs(hub.deviations[200:] / np.sqrt(law[199:]) - 1).max() < 1e-3
     turning = np.linalg.solve(own.inertia, own.moments(bias[None])[0])
-    assert np.allclose(hub.means["bias"][-1], turning * 32.0)
-    assert np.allclose(hub.means["tilt at the start"][-1], [0.01, 0.0, 0.0])
+    assert np.allclose(hub.mean_errors["bias"][-1], turning * 32.0)
+    assert np.allclose(hub.mean_errors["tilt at the start"][-1], [0.01, 0.0, 0.0])
     space = predicted_drift(car, level, PERIOD, 2.0, "inertial")
-    late = space.means["tilt at the start"][[1000, 2000], 0]
+    late = space.mean_errors["tilt at the start"][[1000, 2000], 0]
     assert abs(np.log(late[1] / late[0]) / own.toppling()[0] - 1) < 0.01  # cosh has become exp, products are small
-    assert hub.passes(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
-    assert hub.angle > space.angle and space.trusted < hub.trusted == 8.0
+    assert hub.passing_time(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
+    assert hub.angle > space.angle and space.trusted_time < hub.trusted_time == 8.0
     off = position(car, Level(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
     assert np.allclose(off, [0.0, 9.81 * 0.01 * 2.0, 0.0])
 
@@ -233,7 +235,9 @@ def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, 
     found = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
     pitch = found.outcome.columns.read("chassis pitch")
     assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
-    assert found.verdict.word == "accepted" and found.outcome.surprise < 1.0  # nothing but the stated noise is missing
+    assert (
+        found.verdict.word == "accepted" and found.outcome.normalised_innovation < 1.0
+    )  # nothing but the stated noise is missing
     free = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold("none", force=2000.0)), tmp_path / "free")
     assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
 

@@ -19,7 +19,7 @@ def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
     vehicle, road = ride("half_car")
     cells = _Cells(vehicle, road, None, 6.0)
     front, rear = cells.length / 6.0, cells.length / 9.0  # the rear axle comes by faster
-    first, second = (cells._crossed(duration)[1] for duration in (front, rear))
+    first, second = (cells._cell_transition(duration)[1] for duration in (front, rear))
     modes = np.vstack([first[:, : 2 * LEGENDRE_MODES], second[:, 2 * LEGENDRE_MODES :]])
     A = block_diag(*(duration * cells.at_rest + cells.length * cells.per_speed for duration in (front, rear)))
     B = np.vstack(cells.at_unit_speed.B) * cells.length**0.5

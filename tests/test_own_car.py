@@ -396,6 +396,6 @@ def test_a_run_that_passes_a_stop_of_the_file_says_so(saloon):
     column = handling.vehicle.coordinates().index(("fl strut", "z"))
     positions = np.zeros((3, len(handling.vehicle.coordinates())))
     positions[:, column] = 0.0, 0.08, 0.11
-    watched = stop.watched({"positions": positions})["fl strut z"]
-    assert (stop.least, stop.most, stop.unit) == (-0.09, 0.1, "m")
-    assert [not stop.least <= value <= stop.most for value in watched] == [False, False, True]
+    watched = stop.watched_values({"positions": positions})["fl strut z"]
+    assert (stop.lower_limit, stop.upper_limit, stop.unit) == (-0.09, 0.1, "m")
+    assert [not stop.lower_limit <= value <= stop.upper_limit for value in watched] == [False, False, True]

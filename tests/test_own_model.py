@@ -257,7 +257,7 @@ def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
 
 def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
     report = compare_paths(geared)
-    assert report.alike and report.has_soft_constraints and 0.0 < report.horizon < 1.0
+    assert report.alike and report.has_soft_constraints and 0.0 < report.comparison_horizon < 1.0
     assert report.distances["mujoco"] > 1e-6  # its couplings give way
     assert any("dry friction sticks" in line for line in report.lines())
 
@@ -301,7 +301,7 @@ def test_urdf_is_built_and_its_xml_says_the_same(tmp_path):
     file = _read(tmp_path, ARM_URDF, "arm.urdf")
     assert all(row.acceleration < 1e-12 for row in certificate(file.twin, 20))
     assert misread_numbers(file) == []
-    assert file.limited == ("joint 'shoulder'",)
+    assert file.ignored_limits == ("joint 'shoulder'",)
     assert "1 shapes" in file.notes[0]
 
 
@@ -371,7 +371,7 @@ def test_a_difference_in_what_is_off_is_listed_as_not_compared(tmp_path):
         ("friction_loss",),
     )
     comparison = compare(first.twin, second.twin, 3)
-    assert comparison.alike and comparison.silent == ()
+    assert comparison.alike and comparison.silent_differences == ()
     assert {each.kind for each in comparison.not_compared} == {"friction loss", "range"}
 
 
@@ -384,7 +384,7 @@ def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, origi
 
 def test_joints_without_a_partner_are_named(tmp_path, original):
     comparison = compare(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
-    assert comparison.apart is None and "joint 'hinge' of a has no partner" in comparison.unmatched
+    assert comparison.acceleration_agreement is None and "joint 'hinge' of a has no partner" in comparison.unmatched
 
 
 def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
@@ -392,12 +392,12 @@ def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
     arm = _read(tmp_path, ARM_URDF, "arm.urdf")
     mujoco.mj_saveLastXML(str(tmp_path / "arm.xml"), arm.twin.model)
     comparison = compare(arm.twin, read(tmp_path / "arm.xml").twin, 3)
-    assert comparison.apart is not None and comparison.apart.acceleration < 1e-4
+    assert comparison.acceleration_agreement is not None and comparison.acceleration_agreement.acceleration < 1e-4
 
 
 def test_paths_of_all_builds_agree_and_the_ledger_closes(tmp_path):
     report = compare_paths(_read(tmp_path, CART).twin)
-    assert report.alike and not report.failed and not report.quaternions
+    assert report.alike and not report.failed and not report.has_quaternions
     assert report.energy < 1e-9  # Simpson's rule at steps of 2 ms
 
 
@@ -411,7 +411,7 @@ def test_a_build_with_another_path_is_told(tmp_path, monkeypatch):
 
     monkeypatch.setattr("models.own_model.path._model_of_build", heavier)
     report = compare_paths(_read(tmp_path, CART).twin)
-    assert not report.alike and report.horizon > 0.9 and report.distances["mujoco"] > 1e-7
+    assert not report.alike and report.comparison_horizon > 0.9 and report.distances["mujoco"] > 1e-7
 
 
 LIMITED = changed(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
@@ -437,7 +437,7 @@ def test_inside_their_ranges_limits_do_nothing(tmp_path):
 
 def test_a_path_that_strikes_a_limit_is_compared_up_to_there(tmp_path):
     report = compare_paths(_read(tmp_path, LIMITED).twin)
-    assert report.alike and report.struck_limit == "joint 'tilt'" and 0.0 < report.horizon < 1.0
+    assert report.alike and report.struck_limit == "joint 'tilt'" and 0.0 < report.comparison_horizon < 1.0
     assert any("joint 'tilt' strikes its limit, which is not built" in line for line in report.lines())
 
 

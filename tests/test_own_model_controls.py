@@ -40,7 +40,7 @@ def test_every_build_has_the_path_of_the_file_under_its_controls(twin, tmp_path)
     """The file's own model takes the controls themselves, the builds have them in the bias of their actuators."""
     table = read_controls(tmp_path / "controls.csv", twin.model)
     report = compare_paths(twin, table=table)
-    assert report.alike and not report.failed and report.horizon == 1.0
+    assert report.alike and not report.failed and report.comparison_horizon == 1.0
     assert report.distances[FILE_BUILD_NAME] < 1e-12
     assert report.energy < 1e-5  # Simpson's rule over odd numbers of steps of 2 ms; 6e-8 at 1 ms
     assert "under controls.csv" in report.lines()[0]

@@ -33,7 +33,7 @@ def _path(name: str) -> Path:
     package, _, rest = name.partition("/")
     spec = find_spec(package)
     if spec is None or spec.origin is None:
-        pytest.samples_per_output(f"{package} is not installed: pip install 'twinrig[robots]'")
+        pytest.skip(f"{package} is not installed: pip install 'twinrig[robots]'")
     return Path(spec.origin).parent / rest
 
 

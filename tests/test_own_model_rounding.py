@@ -34,7 +34,11 @@ def test_no_coordinate_hides_behind_one_that_accelerates_more(tmp_path, monkeypa
     first, second = (_read(tmp_path, _beside(k), f"{k}.xml").twin for k in (10.0, stiffness))
     comparison = compare(first, second, 3)
     (difference,) = comparison.influential
-    assert not comparison.alike and difference.owner == "joint 'x'" and comparison.apart.worst == "joint 'x'"
+    assert (
+        not comparison.alike
+        and difference.owner == "joint 'x'"
+        and comparison.acceleration_agreement.worst == "joint 'x'"
+    )
     assert all(row.alike for row in certificate(first, 20))
     honest = equations_of_build
     monkeypatch.setattr(certifying, "equations_of_build", lambda twin, build: honest(second, build))

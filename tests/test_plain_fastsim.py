@@ -184,6 +184,10 @@ def test_the_kernel_from_curvatures_to_forces(cells):
 def linear(ellipse):
     """Kalker 1967, all of the area sticking."""
     c11, c22, c23, c33 = plain.coefficients(ellipse.a / ellipse.b, PAIR.nu)
-    matrix = [[c11, 0, 0], [0, c22, c23 * ellipse.c], [0, -c23 * ellipse.c, c33 * ellipse.c**2]]
-    forces = -PAIR.G * ellipse.c**2 * np.array(matrix) @ [ellipse.xi_x, ellipse.xi_y, ellipse.spin]
+    matrix = [
+        [c11, 0, 0],
+        [0, c22, c23 * ellipse.mean_semi_axis],
+        [0, -c23 * ellipse.mean_semi_axis, c33 * ellipse.mean_semi_axis**2],
+    ]
+    forces = -PAIR.G * ellipse.mean_semi_axis**2 * np.array(matrix) @ [ellipse.xi_x, ellipse.xi_y, ellipse.spin]
     return np.append(forces, 1.0)

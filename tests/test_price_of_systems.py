@@ -56,7 +56,7 @@ def test_a_path_with_linear_creep_is_held_by_steps_alone():
     scene = own(PATHS)
     found = recommend(scene, 1e-9)
     assert found.winners["", "calls"].error <= 1e-9 and scene.counted == "force calls"
-    assert "DOP853" in found.searched.how  # another family has said the same
+    assert "DOP853" in found.search_truth.origin  # another family has said the same
 
 
 def test_more_cells_come_nearer_and_are_counted():

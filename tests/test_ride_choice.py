@@ -111,9 +111,9 @@ def test_what_saves_no_calls_stays():
     mass = named(scene)["mass of all wheels"]
     chooser = Chooser(scene, [SPEED], ["travel front left"], 0.3)
     choice = chooser.choose()
-    assert chooser.holds(chooser.confirm(frozenset([mass]))) and not choice.left_out
+    assert chooser.holds(chooser.confirmed_changes(frozenset([mass]))) and not choice.left_out
     assert chooser.cost(frozenset([mass])).calls > chooser.cost(frozenset()).calls
-    assert choice.after == choice.before
+    assert choice.cost_after == choice.cost_before
 
 
 def test_identity_and_screen_of_a_small_change():
@@ -121,10 +121,10 @@ def test_identity_and_screen_of_a_small_change():
     whole, rows = FullScene(scene, SPEED), [0, 2, 4]
     screen, effect = Screen(whole.full, rows), named(scene)["tyre damping"]
     rest = whole.reduced(reduced_without(scene, [effect]))
-    two, one = screen.identity(rest)
+    two, one = screen.certificate_sides(rest)
     assert np.abs(two / one - 1).max() < 1e-12
-    full = screen.solved.variance.astype(float)
-    predicted, true = (np.sqrt(v / full) - 1 for v in (screen.predicted(rest), exact_variances(rest, rows)))
+    full = screen.extended_solution.variance.astype(float)
+    predicted, true = (np.sqrt(v / full) - 1 for v in (screen.predicted_variances(rest), exact_variances(rest, rows)))
     assert np.all((predicted / true > 0.9) & (predicted / true < 1.1)) and np.all(true > 1e-3)
 
 
@@ -221,7 +221,7 @@ def test_rounding_is_not_taken_for_white_noise():
     own = Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
-    assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.within_tolerance
+    assert choice.predicted_change == pytest.approx(choice.confirmed_change, rel=0.2) and choice.within_tolerance
 
 
 def test_options_of_copies_are_refused_where_a_vehicle_is_linear(twinrig, capsys):
@@ -239,13 +239,15 @@ def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_ch
 
 def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     """Neither what a sound certificate lets go nor any other set is reported as left out."""
-    drew, exact = drawn_ride(38, 0.02), Screen.identity
+    drew, exact = drawn_ride(38, 0.02), Screen.certificate_sides
 
     def chooser():
         return Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
 
     sound = frozenset(chooser().choose().left_out)
-    monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
+    monkeypatch.setattr(
+        Screen, "certificate_sides", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1])
+    )
     doubtful = chooser()
     assert sound and not doubtful.choose().left_out
     assert sound in doubtful.uncertified_sets and not doubtful.within_tolerance(sound)
@@ -264,11 +266,13 @@ def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
     assert (
         chosen
         and choice.within_tolerance
-        and abs(choice.off).max() > abs(choice.between).max() >= abs(choice.confirmed).max()
+        and abs(choice.change_with_parameters_off).max()
+        > abs(choice.change_between_speeds).max()
+        >= abs(choice.confirmed_change).max()
     )
-    assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.off).max() / 0.02
+    assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.change_with_parameters_off).max() / 0.02
     saving = measured_step(chooser, chosen) / measured_step(chooser, frozenset())
-    assert saving == pytest.approx(choice.before.calls / choice.after.calls, rel=0.02)
+    assert saving == pytest.approx(choice.cost_before.calls / choice.cost_after.calls, rel=0.02)
 
 
 def test_spectra_near_a_scene_are_those_of_the_exact_solve():
@@ -291,11 +295,11 @@ def test_a_run_does_what_the_closed_form_of_runs_says():
     """Steps of 80 % of the stable one change deviations by per cents; a planted 10 % longer step is seen."""
     scene = held("half_car", cutoff=50.0)
     march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
-    step = 0.8 * march.longest
+    step = 0.8 * march.longest_stable_step
     assert confirms_step(march, step)
     run = comparison_of_steps(march, step)
     wrong = march.deviations(1.1 * step) / march.deviations(step / 4)
-    assert (abs(run.ratio - wrong) > 4 * run.error).any()
+    assert (abs(run.deviation_ratio - wrong) > 4 * run.error).any()
 
 
 @pytest.mark.parametrize(
@@ -308,7 +312,7 @@ def test_two_closed_forms_of_runs_agree(road):
     scene = held("half_car", tyre_damping=300.0, **road)
     march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
     for share in (0.9, 0.2):
-        step = share * march.longest
+        step = share * march.longest_stable_step
         assert Sampled(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
     late = replace(march, reduced=replace(march.reduced, excitation=further(march.reduced.excitation)))
     if scene.ride.road.front_rear == "delayed":

@@ -77,7 +77,7 @@ def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
     (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
     assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.named == ("body z",)
-    k, c = whole.steps_at_speeds[0].springs[spring.name].gains
+    k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
         opened(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
@@ -98,7 +98,7 @@ def test_a_choice_is_kept_and_says_what_chance_may_add():
     scene = quarter_car()
     choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
     assert choice.within_tolerance and choice.left_out and choice.times > 1
-    assert scene.tolerance - choice.confirmed[0] >= choice.chance[0] > 0.0
+    assert scene.tolerance - choice.confirmed_change[0] >= choice.statistical_error[0] > 0.0
 
 
 def test_few_copies_find_what_all_of_them_tell():

@@ -41,7 +41,7 @@ def test_motions_tell_covariance_adjoint_and_exponential(more):
     L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
     scale = size(np.einsum("ki,kj->kij", *[np.diagonal(L, axis1=1, axis2=2)] * 2))
     assert np.abs(modes.adjoints(C) - L).max() < 1e-9 * scale.max()
-    assert modes.moved(0.1, np.eye(len(A))) == pytest.approx(expm(0.1 * A), abs=1e-8 * np.abs(A).max())
+    assert modes.propagated(0.1, np.eye(len(A))) == pytest.approx(expm(0.1 * A), abs=1e-8 * np.abs(A).max())
 
 
 def test_motions_that_are_alike_are_left_to_the_solve():

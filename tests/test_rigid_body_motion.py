@@ -98,9 +98,9 @@ def test_noise_gains_are_those_of_a_car_floor():
     for height, wanted in ((1.0, 0.69), (0.3, 1.9), (0.1, 5.8), (0.03, 18.9)):
         array = sensor_array(tilted_sensors(height, np.eye(3)), "spatial")
         # relative to the mean of all sensors up to 3 % less
-        assert 0.96 * wanted < array.gains().max() < 1.02 * wanted
-        assert array.gains()[2] == pytest.approx(0.486, abs=1e-3)
-        assert array.gains(planar=True).max() == pytest.approx(1 / 1.2)
+        assert 0.96 * wanted < array.noise_gains().max() < 1.02 * wanted
+        assert array.noise_gains()[2] == pytest.approx(0.486, abs=1e-3)
+        assert array.noise_gains(planar=True).max() == pytest.approx(1 / 1.2)
 
 
 @pytest.mark.parametrize("loose", range(5))
@@ -121,7 +121,7 @@ def test_misfit_of_noise_is_what_the_redundancy_says(height):
     noisy = sensor_readings(array.positions) + 0.05 * RANDOM.normal(size=(len(PATH.rates), 5, 3))
     found = motion.fit_quality(array, noisy, noise=0.05)
     # 2001 samples of 6 equations: 1 % standard error; the rates are not quite those of least squares
-    assert 0.96 < np.sqrt(np.mean(found.misfit**2)) / found.expected < 1.2
+    assert 0.96 < np.sqrt(np.mean(found.misfit**2)) / found.expected_misfit < 1.2
 
 
 def test_three_sensors_say_that_nothing_can_be_said():

@@ -133,12 +133,12 @@ def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_
             Chooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor) for executor in (None, pool)
         ]
         alone, shared = (chooser.choose() for chooser in choosers)
-        assert told(alone) == told(shared) and alone.left_out and alone.spent > 0
+        assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
         variants = Variants(half_car(), "reference", pool)
         variants.ahead((frozenset([name]), 1) for name in variants.effects)
-        assert len(variants._ready) == len(variants.effects) > 3 and variants.calls == 0
+        assert len(variants._computed_in_advance) == len(variants.effects) > 3 and variants.calls == 0
         first = variants.of(["gyro"])
-    assert len(variants._ready) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
+    assert len(variants._computed_in_advance) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
     here = Variants(half_car(), "reference").of(["gyro"])
     assert first.counts == here.counts and first.quantities.keys() == here.quantities.keys()
     for name, quantity in here.quantities.items():
@@ -203,7 +203,7 @@ def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
 def test_a_price_by_workers_names_the_settings_of_one_process():
     with process_pool(2) as pool:
         alone, shared = (recommend(Planted(), 1e-2, executor) for executor in (None, pool))
-    assert same(alone.truth, shared.truth) and same(alone.searched, shared.searched)
+    assert same(alone.truth, shared.truth) and same(alone.search_truth, shared.search_truth)
     for engine in ("", "exudyn"):
         by_itself, by_workers = (each.winners[engine, "calls"] for each in (alone, shared))
         assert _facts(by_itself) == _facts(by_workers)

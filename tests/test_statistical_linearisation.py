@@ -95,12 +95,12 @@ def test_gains_are_those_of_their_own_covariance():
     assert own.deviation == pytest.approx(travel, rel=1e-11)
     stops, damper = of_curve(spring.travel_force, own.travel, travel), of_curve(spring.rate_force, 0.0, own.rate)
     dry = of_friction(spring.friction, spring.friction_rate, own.rate)
-    assert own.gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
+    assert own.equivalent_gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
     assert spring.stiffness * own.travel + stops[0] + damper[0] == pytest.approx(0.0, abs=1e-8)
     assert own.travel > 0.005, "a damper that is harder in rebound pulls the body down: mm, in compression"
     assert found.mean[found.covariance.names.index("travel front left")] == pytest.approx(own.travel, rel=1e-12)
     assert 0.0 < found.contraction < 0.5
-    assert found.distance < 1e-11
+    assert found.fixed_point_distance < 1e-11
 
 
 def test_sentences_say_when_the_covariance_is_no_longer_good():

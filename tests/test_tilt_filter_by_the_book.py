@@ -74,10 +74,10 @@ def test_the_filter_of_a_measurement_has_the_moments_and_deviations_of_its_vehic
     tilt = estimate(car, forces, angles, stated)
     assert tilt.states == pytest.approx(states, rel=1e-9, abs=1e-12) and tilt.period == DT
     assert tilt.deviations == pytest.approx(deviations, rel=1e-9)
-    assert tilt.surprise == pytest.approx(squares / (4 * (SAMPLES - 1)), rel=1e-9)
+    assert tilt.normalised_innovation == pytest.approx(squares / (4 * (SAMPLES - 1)), rel=1e-9)
     whole = TiltFilter(car, forces.frame, DT, stated)
     assert whole.advance(forces.samples, angles.samples)[0] == pytest.approx(states, rel=1e-9, abs=1e-12)
-    assert whole.surprise == pytest.approx(tilt.surprise, rel=1e-12)
+    assert whole.normalised_innovation == pytest.approx(tilt.normalised_innovation, rel=1e-12)
 
 
 def test_biases_are_means_of_the_innovations_with_fewer_of_them_where_they_hang_together(measurement):

@@ -95,7 +95,7 @@ def test_curves_have_marks_at_the_points_of_their_own_engine(tmp_path, monkeypat
     draw_sweep(swept, tmp_path)
     marks = {line.get_label(): line.get_xydata().tolist() for line in seen[0].axes[0].lines}
     assert marks[WARNING_MARK["label"]] == [[2.0, 2.5]] and [2.0, 2.5] in marks[BROKEN_MARK["label"]]
-    assert swept.broken("reference") == [1] and swept.warned("reference") == []
+    assert swept.broken_points("reference") == [1] and swept.warned_points("reference") == []
 
 
 def test_what_results_say_survives_json(pulling):
@@ -149,16 +149,16 @@ def test_a_choice_keeps_what_the_assumptions_need_and_states_its_error(tmp_path)
     (tmp_path / "s.toml").write_text(CHOICE)
     scene = load(tmp_path / "s.toml")
     found = choice_of_scene(scene, ())
-    assert "lift_off" in found.staying_effects and {one.name for one in found.choice.barred["lift_off"]} >= {
-        "tyres press"
-    }
+    assert "lift_off" in found.staying_effects and {
+        one.name for one in found.choice.assumptions_barring["lift_off"]
+    } >= {"tyres press"}
     said = "\n".join(choice_lines(found, False))
     assert "lift_off stays; without it an assumption would be broken: linear tyres stay on the road" in said
     (left,) = found.results
     assert errors_of(left) and broken_of(left) == []
     monkey = Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    monkey.barred = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
-    assert not monkey.holds(monkey.confirm(frozenset(["lift_off"])))
+    monkey.breaks_assumption = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
+    assert not monkey.within_tolerance(monkey.confirm(frozenset(["lift_off"])))
 
 
 def test_points_of_work_precision_curves_are_marked():
@@ -283,4 +283,4 @@ def test_results_of_engines_are_not_of_others(pulling):
     other = replace(pulling, data=pulling.data.copy())
     other.data.attrs["engine"] = "exudyn"
     swept = SweepResults("s", "k", (1,), {}, [{}], [{"exudyn": other}])
-    assert swept.broken("mujoco") == [] and swept.broken("exudyn") == [0] == swept.broken("")[0:1]
+    assert swept.broken_points("mujoco") == [] and swept.broken_points("exudyn") == [0] == swept.broken_points("")[0:1]

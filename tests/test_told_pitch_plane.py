@@ -165,8 +165,8 @@ def test_a_motion_that_no_angles_and_no_samples_tell(files):
 
 def within(assumption):
     """Whether what is watched of a motion stays where it may."""
-    values = np.concatenate(list(assumption.watched(None).values()))
-    return bool(((values >= assumption.least) & (values <= assumption.most)).all())
+    values = np.concatenate(list(assumption.watched_values(None).values()))
+    return bool(((values >= assumption.lower_limit) & (values <= assumption.upper_limit)).all())
 
 
 def test_a_trust_in_large_errors_is_told():

@@ -116,7 +116,7 @@ def test_a_bias_starts_from_its_draw_and_forgets_by_its_time():
 
 def test_the_range_of_a_sensor_has_two_ends():
     assumed = within_range("gyro", {"gyro": "gyro"}, "rad/s", 2.5)
-    assert (assumed.least, assumed.most) == (-2.5, 2.5)
+    assert (assumed.lower_limit, assumed.upper_limit) == (-2.5, 2.5)
 
 
 def test_a_scene_s_controller_has_its_parameters():

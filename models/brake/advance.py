@@ -36,7 +36,7 @@ def end_status(motion, plane):
         elif not (a or c) or not (b or d):
             status = ROLLED_OVER
     for k in range(1, plane.masses.size):
-        if abs(headings[k] - headings[k - 1]) > plane.fold:
+        if abs(headings[k] - headings[k - 1]) > plane.jackknife_angle:
             status = FOLDED
     return status
 
@@ -130,7 +130,7 @@ def _folded_sentence(plane: Plane, headings: np.ndarray) -> str:
     angles = np.degrees(np.diff(headings))
     k = int(np.argmax(np.abs(angles)))
     hinge = HINGE_NAMES[k] if angles.size > 1 else HINGE_NAMES[1]
-    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {math.degrees(plane.fold):g} deg"
+    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {math.degrees(plane.jackknife_angle):g} deg"
 
 
 def _side_or_axle_lifted(loads: np.ndarray) -> bool:

@@ -162,7 +162,7 @@ class Locks:
 
     time: np.ndarray
     share: np.ndarray
-    longest: np.ndarray
+    longest_lock: np.ndarray
 
 
 def lock_table(

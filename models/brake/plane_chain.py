@@ -66,7 +66,7 @@ def coordinates(plane):
 @inlined
 def count_of_prescribed(plane):
     """Number of coordinates with a prescribed motion; they are the first ones: two at a hook, else none."""
-    return 0 if len(plane.units) == 1 else 2 * plane.hooked
+    return 0 if len(plane.units) == 1 else 2 * plane.has_prescribed_hook
 
 
 @inlined

@@ -59,7 +59,7 @@ def settle(motion, steer, regular, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
     the start of the step, and the wheels' steer angles and speeds along them are stored."""
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
-    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.still
+    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.static_load
     fill_headings(positions, units)
     for i in range(plane.unit.size):
         along, aside, g, k = frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
@@ -159,7 +159,7 @@ def respond(motion, before, after, step, vehicle, frame):
     ``motion``. A step's solution is a fixed point of this map. before, after (W,) : torques at the ends of the step."""
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
-    load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start
+    load, still, rate, start = wheels.load, wheels.static_load, wheels.rate, wheels.start
     size, free, lifts = coordinates(plane), count_of_prescribed(plane), False
     for a in range(size):
         out[a] = accelerations[a] if a < free else right[a]
@@ -324,7 +324,11 @@ def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
             math.inf if half else ACCELERATION_TOLERANCE
         ):
             return -1.0
-        rest = comes_to_rest(rate0, turning, accelerations, step, plane) if half and not plane.hooked else -1.0
+        rest = (
+            comes_to_rest(rate0, turning, accelerations, step, plane)
+            if half and not plane.has_prescribed_hook
+            else -1.0
+        )
         if rest >= 0.0:
             time = rest
         for a in range(size):

@@ -77,7 +77,7 @@ class QuarterStop:
     """Motion from the start to the end, and the index of the step in which the vehicle came to rest, or -1."""
 
     path: QuarterPath
-    rest: int
+    step_of_rest: int
 
     @property
     def distance(self) -> float:
@@ -85,7 +85,7 @@ class QuarterStop:
         return float(self.path.position[-1] - self.path.position[0])
 
     @property
-    def released(self) -> float:
+    def release_time(self) -> float:
         """Time (s) at which the wheel first turned again after a locked period; NaN if it never did."""
         time, locked = self.path.time, self.path.locked
         held = np.flatnonzero(locked > 0.0)

@@ -62,15 +62,15 @@ class Sprung:
     @property
     def turns(self) -> np.ndarray:
         """Numbers (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
-        return self._turning("rz")
+        return self._turning_coordinates("rz")
 
     @property
     def leans(self) -> np.ndarray:
         """Numbers of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the one before
         it."""
-        return np.concatenate(([ROLL, PITCH], self._turning("rx"), self._turning("ry")))
+        return np.concatenate(([ROLL, PITCH], self._turning_coordinates("rx"), self._turning_coordinates("ry")))
 
-    def _turning(self, freedom: Freedom) -> np.ndarray:
+    def _turning_coordinates(self, freedom: Freedom) -> np.ndarray:
         free = self.handling.vehicle
         places = [(hitch_of(name), freedom) for name in free.towed]
         known = free.coordinates()
@@ -103,7 +103,7 @@ class Sprung:
             static=np.array([self.handling.held.tyres[tyre.name] for tyre in free.tyres]),
             by_x=none,
             by_y=none.copy(),
-            fold=FOLD,
+            jackknife_angle=FOLD,
             units=np.arange(len(units)),
         )
 

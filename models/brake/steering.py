@@ -39,11 +39,11 @@ class Steering:
 @dataclass(frozen=True)
 class YawResponse:
     """time : s, from half of the final steer angle to 90 % of the steady yaw rate; overshoot : ratio of peak yaw rate
-    above the steady one to the steady one; steady : yaw rate, rad/s."""
+    above the steady one to the steady one; steady_rate : yaw rate, rad/s."""
 
     time: float
     overshoot: float
-    steady: float
+    steady_rate: float
 
 
 def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:

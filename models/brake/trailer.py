@@ -87,7 +87,7 @@ def follow_hook(
     state (2, 2 + U) : positions and rates at the start; slope : see ``OnRoad``; torques (W,) : of its brakes, N m.
     Raises InputError.
     """
-    if not plane.hooked:
+    if not plane.has_prescribed_hook:
         raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
     pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
     turning = np.hypot(*state[1, :2]) / plane.radius

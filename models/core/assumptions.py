@@ -32,7 +32,8 @@ Watched = Mapping[str, np.ndarray | Gaussian]
 
 @dataclass(frozen=True)
 class Assumption:
-    """One assumption: that the values of ``watched`` stay between ``least`` and ``most``, in ``unit``.
+    """One assumption: that the values of ``watched_values`` stay between ``lower_limit`` and ``upper_limit``, in
+    ``unit``.
 
     name : a few words; says : a sentence; remedy : what removes the assumption, such as an effect to name.
     """
@@ -40,18 +41,20 @@ class Assumption:
     name: str
     says: str
     remedy: str
-    watched: Callable[[Result], Watched]
+    watched_values: Callable[[Result], Watched]
     unit: str
-    least: float = -math.inf
-    most: float = math.inf
+    lower_limit: float = -math.inf
+    upper_limit: float = math.inf
 
     @property
     def allowed(self) -> str:
         """Text on the allowed range."""
-        low, high = f"at least {self.least:g}", f"at most {self.most:g}"
-        if math.isinf(self.most):
+        low, high = f"at least {self.lower_limit:g}", f"at most {self.upper_limit:g}"
+        if math.isinf(self.upper_limit):
             return f"{low} {self.unit}".rstrip()
-        return (high if math.isinf(self.least) else f"from {self.least:g} to {self.most:g}") + f" {self.unit}".rstrip()
+        return (
+            high if math.isinf(self.lower_limit) else f"from {self.lower_limit:g} to {self.upper_limit:g}"
+        ) + f" {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -83,10 +86,10 @@ class BrokenAssumption:
 
     def fact(self) -> str:
         """Sentence that the assumption was broken, for readers who know the assumption."""
-        return f"{self.says}; {self.where}, {self._time}, {self._worst_value_text}"
+        return f"{self.says}; {self.where}, {self._time_text}, {self._worst_value_text}"
 
     @property
-    def _time(self) -> str:
+    def _time_text(self) -> str:
         if math.isnan(self.first) and not self.law:
             return "once"
         return f"{100.0 * self.share:.3g} % of the time" + self.law
@@ -95,7 +98,7 @@ class BrokenAssumption:
         """A full sentence for readers who do not know the assumption."""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst_value_text} "
+            f"assumption broken: {self.says}; {self.where}: {self._time_text}{first}, {self._worst_value_text} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 
@@ -107,16 +110,16 @@ def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | N
         _longest_exceedance(run, assumption, where, values)
         if isinstance(values, Gaussian)
         else _gaussian_violation(run, assumption, where, np.asarray(values, float))
-        for where, values in assumption.watched(run).items()
+        for where, values in assumption.watched_values(run).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
 def _gaussian_violation(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
-    beyond = (values < a.least) | (values > a.most)
+    beyond = (values < a.lower_limit) | (values > a.upper_limit)
     if not beyond.any():
         return None
-    excess = np.where(beyond, np.maximum(a.least - values, values - a.most), -np.inf)
+    excess = np.where(beyond, np.maximum(a.lower_limit - values, values - a.upper_limit), -np.inf)
     timed = "time" in run.data.coords and len(values) == len(run.times)
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
@@ -129,7 +132,7 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = np.array([a.least - values.mean, values.mean - a.most]) / values.deviation
+        sides = np.array([a.lower_limit - values.mean, values.mean - a.upper_limit]) / values.deviation
     known = np.isfinite(values.deviation) & (values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
     if not (shares > ALLOWED_TIME_SHARE).any():

@@ -39,7 +39,7 @@ class FileLine(NamedTuple):
 
     number: int
     text: str
-    begin: int
+    first_byte: int
     end: int
 
 
@@ -172,7 +172,7 @@ def _head_in_line(
             above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
             first = lines[j]
             return TableHead(
-                lines[i], separator, tuple(names), len(cells), above, between, first.begin, first.number - 1
+                lines[i], separator, tuple(names), len(cells), above, between, first.first_byte, first.number - 1
             )
         if any(is_number(cell) or is_known_heading(cell) for cell in cells):
             return None

@@ -39,8 +39,8 @@ class Entry:
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
     adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
     ``Effect``.
-    usual : what the key is where the effect has usual values, None where there are none. An effect that is not the
-    presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
+    usual_value : what the key is where the effect has usual values, None where there are none. An effect that is not
+    the presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
     ``put_in(table, scene)``.
     """
 
@@ -54,7 +54,7 @@ class Entry:
     after: tuple[str, ...] = ()
     modules: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
-    usual: Any = None
+    usual_value: Any = None
     there: Callable[[Any], bool] | None = None
     leave_out: Callable[[Table, Any], None] | None = None
     put_in: Callable[[Table, Any], None] | None = None
@@ -85,7 +85,7 @@ class Entry:
         *above, key = self.place.split(".")
         for name in above:
             table = table.setdefault(name, {})
-        table[key] = deepcopy(self.usual)
+        table[key] = deepcopy(self.usual_value)
 
 
 class Effect:
@@ -120,7 +120,7 @@ def _of_entry(entry: Entry) -> Effect:
     known = {key.upper(): getattr(entry, key) for key in said}
     known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
     known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
-    return Effect(known if entry.usual is None and entry.put_in is None else known | {"put_in": entry.add})
+    return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
 
 
 def names_of(system: str) -> tuple[str, ...]:

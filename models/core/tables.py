@@ -259,12 +259,12 @@ class RowBlock:
     """Successive rows of a table.
 
     lines : (rows,) line of the file, counted from 1. values : name -> (rows,) in SI, NaN throughout a wrong row.
-    wrong : row of the block -> what is wrong with it.
+    faulty_rows : row of the block -> what is wrong with it.
     """
 
     lines: list[int]
     values: dict[str, np.ndarray]
-    wrong: dict[int, str]
+    faulty_rows: dict[int, str]
 
 
 def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:

@@ -32,7 +32,7 @@ class AcceptedStatistic:
     high: float
 
     @property
-    def inside(self) -> bool:
+    def is_within_interval(self) -> bool:
         """Whether the statistic lies within its acceptance interval."""
         return self.low <= self.value <= self.high
 
@@ -45,18 +45,18 @@ class AcceptedStatistic:
 class Consistency:
     """Statistics of a run's innovations, the first one being the mean square of all normalised innovations."""
 
-    figures: tuple[AcceptedStatistic, ...]
+    statistics: tuple[AcceptedStatistic, ...]
 
     @property
     def consistent(self) -> bool:
         """Whether all statistics lie within their acceptance intervals."""
-        return all(figure.inside for figure in self.figures)
+        return all(figure.is_within_interval for figure in self.statistics)
 
     def __str__(self) -> str:
         """One sentence: which statistics are outside their intervals, or that none is."""
         if self.consistent:
-            return f"its innovations are as stated: {self.figures[0]}"
-        wrong = "; ".join(map(str, (figure for figure in self.figures if not figure.inside)))
+            return f"its innovations are as stated: {self.statistics[0]}"
+        wrong = "; ".join(map(str, (figure for figure in self.statistics if not figure.is_within_interval)))
         return (
             f"its innovations are not what model and stated deviations make: {wrong}; in brackets where those "
             f"of a right filter lie, but for one run in {1 / FALSE_ALARM_SHARE:.0f}"

@@ -103,7 +103,7 @@ class _Failure:
 
     reason: str
     full: bool = False
-    gone: bool = False
+    worker_is_gone: bool = False
     error: InputError | RunFailed | None = None
 
 
@@ -130,7 +130,7 @@ class _PathCounter:
     paths: int
     done: int
     tell: Callable[[EnsembleProgress], None]
-    begun: float = field(default_factory=time.perf_counter)
+    start_time: float = field(default_factory=time.perf_counter)
     before: int = 0
 
     def __post_init__(self) -> None:
@@ -139,7 +139,7 @@ class _PathCounter:
 
     def add(self, paths: int) -> None:
         self.done += paths
-        rate = (self.done - self.before) / (time.perf_counter() - self.begun)
+        rate = (self.done - self.before) / (time.perf_counter() - self.start_time)
         self.tell(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
 
 
@@ -183,7 +183,7 @@ def each_block(
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
     count, block = blocks.count(paths), partial(blocks.block, paths=paths)
     store = _Memory() if folder is None else Store(folder)
-    with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
+    with nullcontext() if isinstance(store, _Memory) else store.reserved_folder(facts):
         failed = dict[int, str]()
         counted = _PathCounter(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
@@ -273,7 +273,7 @@ def _next_kept(
     if isinstance(answer, _Failure):
         if answer.full:
             raise _disk_full(answer.reason, store)
-        if answer.gone:
+        if answer.worker_is_gone:
             raise _lost_workers_error(answer.reason, store)
         failed[i] = answer.reason
         return True
@@ -388,7 +388,7 @@ def _error_text(error: BaseException) -> _Failure:
     if _worker_died(error):
         return _Failure("its worker died: killed, or out of memory")
     if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":
-        return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", gone=True)
+        return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", worker_is_gone=True)
     full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRORS
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
     return _Failure(said, full, error=error if isinstance(error, InputError | RunFailed) else None)

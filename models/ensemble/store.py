@@ -35,7 +35,7 @@ class Store:
     folder: Path
 
     @contextmanager
-    def claimed(self, facts: dict[str, Any]) -> Iterator[None]:
+    def reserved_folder(self, facts: dict[str, Any]) -> Iterator[None]:
         """Context in which the folder is reserved for this job and process.
 
         Raises InputError if it belongs to another job, or if another process is at work in it.

@@ -22,15 +22,15 @@ class CountedLoad:
     """Results of counting one load.
 
     damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
-    least that range; least, largest_load : the load's extremes; mean.
+    least that range; smallest_load, largest_load : the load's extremes; mean.
     """
 
     damage: dict[float, float]
     levels: np.ndarray
     crossings: np.ndarray
     ranges: np.ndarray
-    pairs: np.ndarray
-    least: float
+    pairs_of_range: np.ndarray
+    smallest_load: float
     largest_load: float
     mean: float
 

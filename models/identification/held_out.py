@@ -32,7 +32,7 @@ class Identified:
     """Results for one vehicle: the fit, the errors on parts of the data that were not used in the fit, and the
     prediction."""
 
-    known: Uncertainty
+    uncertainty: Uncertainty
     errors: list[ErrorModel]
     cross_validation_errors: np.ndarray
     bands: Bands
@@ -49,7 +49,7 @@ def identified_vehicle(
     crossed = cross_validated(solved, search.blocks, progress)
     predicted = problem.predicted(solved.values)
     errors = [
-        error_model(row[channel.used], model[channel.used])
+        error_model(row[channel.is_used], model[channel.is_used])
         for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
     ]
     progress("the prediction", 0.9)

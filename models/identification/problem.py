@@ -43,9 +43,9 @@ class Parameter:
             allowed = f"must start between its bounds, {self.low:g} and {self.high:g}"
             raise InputError("--parameters", self.name, self.start, allowed)
         if self.scale <= 0.0:
-            object.__setattr__(self, "scale", self._scale())
+            object.__setattr__(self, "scale", self._default_scale())
 
-    def _scale(self) -> float:
+    def _default_scale(self) -> float:
         if self.start != 0.0:
             return abs(self.start)
         if np.isfinite(self.high - self.low):
@@ -56,11 +56,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class FitClock:
-    """times (n,) : s, even; edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the samples
-    that residuals keep."""
+    """times (n,) : s, even; low_pass_edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the
+    samples that residuals keep."""
 
     times: np.ndarray
-    edge: float = 0.0
+    low_pass_edge: float = 0.0
 
     @property
     def period(self) -> float:
@@ -71,30 +71,34 @@ class FitClock:
     def stride(self) -> int:
         """Interval, in samples, between the samples that residuals keep; after the low-pass, the signal hardly changes
         in between."""
-        return max(1, int(1.0 / (SAMPLES_PER_PERIOD * self.edge * self.period) + 1e-9)) if self.edge > 0.0 else 1
+        return (
+            max(1, int(1.0 / (SAMPLES_PER_PERIOD * self.low_pass_edge * self.period) + 1e-9))
+            if self.low_pass_edge > 0.0
+            else 1
+        )
 
     def filtered(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) after the low-pass filter."""
-        if self.edge <= 0.0:
+        if self.low_pass_edge <= 0.0:
             return values
-        return low_passed(values[:, None], self.period, self.edge, "", "--low-pass")[:, 0]
+        return low_passed(values[:, None], self.period, self.low_pass_edge, "", "--low-pass")[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelOnClock:
-    """One channel on the clock: values (n,), low-passed; used (n,) : which of them count; left_out : samples of the
+    """One channel on the clock: values (n,), low-passed; is_used (n,) : which of them count; left_out : samples of the
     file that were spikes or not measured."""
 
     name: str
     unit: str
     values: np.ndarray
-    used: np.ndarray
+    is_used: np.ndarray
     left_out: int
 
     @cached_property
     def size(self) -> float:
         """Root mean square of the used samples, to which residuals are related."""
-        return float(np.sqrt(np.mean(self.values[self.used] ** 2)))
+        return float(np.sqrt(np.mean(self.values[self.is_used] ** 2)))
 
 
 def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place: str = "") -> ChannelOnClock:
@@ -180,7 +184,7 @@ class Problem:
     def weights(self) -> np.ndarray:
         """Weights (channels, m): 0 for samples that do not count."""
         every, part = slice(None, None, self.clock.stride), self.taking_part
-        rows = [channel.used & (True if part is None else part) for channel in self.channels]
+        rows = [channel.is_used & (True if part is None else part) for channel in self.channels]
         return np.array([row[every] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
@@ -206,7 +210,7 @@ class Problem:
         of : what is derived, the residuals if nothing else is named; executor : computes its columns.
         """
         answer = self.residuals if of is None else of
-        ways = [self._ways(values, k) for k in range(len(self.parameters))]
+        ways = [self._difference_steps(values, k) for k in range(len(self.parameters))]
         base, there = answer(values), block_results(answer, [way[0][0] for way in ways], executor)
         again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED_RESIDUAL]
         chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
@@ -215,7 +219,7 @@ class Problem:
         columns = [(row - base) / change for row, (_, change) in zip(there, chosen, strict=True)]
         return np.stack(columns, axis=-1)
 
-    def _ways(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
+    def _difference_steps(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
         """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
         divided by its scale. Steps stay within the bounds; near the upper one the backward step comes first."""
         each, ways = self.parameters[k], list[tuple[np.ndarray, float]]()

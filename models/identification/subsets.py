@@ -82,8 +82,8 @@ class Choice:
     """All subsets of parameters in the order of their criterion, their weights (probabilities), and the inflation
     factor c of chi^2.
 
-    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart; blind : parameters
-    on which no measured number depends.
+    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart;
+    undetermined_parameters : parameters on which no measured number depends.
     """
 
     subset_fits: list[Subset]
@@ -91,7 +91,7 @@ class Choice:
     weights: np.ndarray
     variance_inflation: float
     calls: dict[str, tuple[float, float]]
-    blind: tuple[str, ...]
+    undetermined_parameters: tuple[str, ...]
 
     @property
     def best_subset(self) -> Subset:

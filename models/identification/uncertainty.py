@@ -36,13 +36,13 @@ PROFILE_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
 class Uncertainty:
     """Uncertainty of fitted parameters, each in its scale: covariance (p, p), information matrix H (p, p).
 
-    free (p,) : estimates that lie at no bound; the others have no covariance.
+    at_no_bound (p,) : estimates that lie at no bound; the others have no covariance.
     """
 
     fit: Fit
     covariance: np.ndarray
     information: np.ndarray
-    free: np.ndarray
+    at_no_bound: np.ndarray
     correlation_time: float
 
     @cached_property
@@ -50,7 +50,7 @@ class Uncertainty:
         """Standard errors (p,) in the units of the parameters; infinite for parameters that the data do not
         determine."""
         spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
-        return np.where(self.free, spread, np.nan)
+        return np.where(self.at_no_bound, spread, np.nan)
 
     @cached_property
     def is_determined(self) -> np.ndarray:
@@ -58,24 +58,24 @@ class Uncertainty:
         bound."""
         with np.errstate(invalid="ignore"):
             narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scale
-        return self.free & narrow
+        return self.at_no_bound & narrow
 
     @cached_property
     def condition(self) -> float:
         """Ratio of the largest to the smallest standard deviation among combinations of parameters, from the
         information matrix."""
-        values = np.linalg.eigvalsh(self.information[np.ix_(self.free, self.free)])
+        values = np.linalg.eigvalsh(self.information[np.ix_(self.at_no_bound, self.at_no_bound)])
         return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR_SHARE * values[-1] else np.inf
 
     def combinations(self) -> list[tuple[float, np.ndarray]]:
         """Uncorrelated combinations of scaled parameters: standard error and direction (p,) of each, the best
         determined first."""
-        inner = np.ix_(self.free, self.free)
+        inner = np.ix_(self.at_no_bound, self.at_no_bound)
         values, vectors = np.linalg.eigh(self.covariance[inner])
         answer = []
         for value, vector in zip(values, vectors.T, strict=True):
-            whole = np.zeros(len(self.free))
-            whole[self.free] = vector * np.sign(vector[np.argmax(np.abs(vector))])
+            whole = np.zeros(len(self.at_no_bound))
+            whole[self.at_no_bound] = vector * np.sign(vector[np.argmax(np.abs(vector))])
             answer.append((float(np.sqrt(max(value, 0.0))), whole))
         return answer
 
@@ -171,7 +171,7 @@ class LikelihoodProfile:
     parabola: np.ndarray
 
     @property
-    def quadratic(self) -> bool:
+    def is_quadratic(self) -> bool:
         """Whether profile and parabola agree to within one half; the standard error then describes the uncertainty
         fully."""
         return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))

@@ -48,8 +48,8 @@ class AxleForces:
     """forces (n, 2) : front and rear, N, up on the wheels, ``period`` (s) apart. signals : of either axle.
 
     duration : s, of the run that they drive. remedies : what to do about a wrong sign, unit or factor, None for those
-    of a channel map. rests : whether the run starts from the static equilibrium; turn : whether the forces turn with
-    the chassis.
+    of a channel map. starts_at_rest : whether the run starts from the static equilibrium; turn : whether the forces
+    turn with the chassis.
     """
 
     forces: np.ndarray
@@ -58,7 +58,7 @@ class AxleForces:
     signals: tuple[tuple[Signal, ...], tuple[Signal, ...]]
     duration: float
     remedies: Mapping[WrongFactor, str] | None = None
-    rests: bool = True
+    starts_at_rest: bool = True
     turn: bool = False
 
     @cached_property
@@ -95,10 +95,12 @@ class AxleForces:
         return tuple(s.name for axle in self.signals for s in axle)
 
     @cached_property
-    def arms(self) -> np.ndarray:
+    def accelerations_per_newton(self) -> np.ndarray:
         """Accelerations (2, 2) per 1 N at the front and at the rear axle: heave (upwards), then pitch (nose up)."""
         body = self.rigid
-        return np.array([[1 / body.mass, 1 / body.mass], [body.front / body.total, -body.rear / body.total]])
+        return np.array(
+            [[1 / body.mass, 1 / body.mass], [body.front_arm / body.total_inertia, -body.rear_arm / body.total_inertia]]
+        )
 
     @cached_property
     def pitch(self) -> tuple[np.ndarray, np.ndarray]:
@@ -108,7 +110,7 @@ class AxleForces:
         The lever arms of vertical forces shorten with the cosine of the pitch. A few iterations account for this while
         the pitch is small.
         """
-        moments = self.forces @ self.arms[1]
+        moments = self.forces @ self.accelerations_per_newton[1]
         rate = self._time_integral(moments)
         pitch = self._time_integral(rate)
         for _ in range(0 if self.turn else PITCH_INTEGRATIONS):
@@ -123,7 +125,7 @@ class AxleForces:
         """Vertical speed (n,) of the centre of mass in m/s, upwards, from integrating the forces, starting at rest."""
         pitch = self.pitch[1]
         upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEPEST_GRADE else 1.0
-        return self._time_integral(self.forces @ self.arms[0] * upright - self.parameters.g)
+        return self._time_integral(self.forces @ self.accelerations_per_newton[0] * upright - self.parameters.g)
 
     def _time_integral(self, values: np.ndarray) -> np.ndarray:
         """Time integral (n,) of samples (n,), starting at the first one."""
@@ -174,12 +176,12 @@ class SteadyResidual:
     units: np.ndarray
 
     @property
-    def shares(self) -> np.ndarray:
+    def shares_of_load(self) -> np.ndarray:
         """Ratios (2,) of the unexplained accelerations to those that a whole load would cause."""
         return self.accelerations / self.units
 
     @property
-    def seen(self) -> np.ndarray:
+    def is_beyond_uncertainty(self) -> np.ndarray:
         """Which of the two steady accelerations (2,) is beyond its uncertainty."""
         return np.abs(self.accelerations) > self.known
 
@@ -192,7 +194,9 @@ def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
     """
     rate, pitch = axles.pitch
     times = _block_means(axles.last_sample_time * np.linspace(-0.5, 0.5, len(axles.forces)))
-    units = np.array([GRAVITY, axles.arms[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)])
+    units = np.array(
+        [GRAVITY, axles.accelerations_per_newton[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)]
+    )
     level = _slope_and_scatter(times, _block_means(axles.rise))
     climbing = (
         _slope_and_scatter(times, _block_means(axles.rise), _block_means(pitch))

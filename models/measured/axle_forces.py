@@ -105,7 +105,7 @@ def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
 def _exchanged_finding(axles: AxleForces) -> list[Finding]:
     """Finding that the two axles' forces fit the static loads only if they are exchanged."""
     as_is, crossed = (np.abs(each / axles.loads - 1).max() for each in (axles.means, axles.means[::-1]))
-    if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).seen[1]:
+    if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).is_beyond_uncertainty[1]:
         return []
     text = (
         f"Front and rear are exchanged: {axles.means[0]:.5g} N in front and {axles.means[1]:.5g} N at the rear on "
@@ -132,11 +132,13 @@ def _wrong_means(axles: AxleForces) -> list[Finding]:
 def _imbalance_findings(axles: AxleForces) -> list[Finding]:
     """Findings on accelerations that a vehicle cannot sustain: steady heave, and steady pitch."""
     motion = equilibrium_residual(axles)
-    if not motion.seen.any():
+    if not motion.is_beyond_uncertainty.any():
         return []
-    beyond = np.abs(motion.shares) > LARGE_SHARE + motion.known / motion.units
+    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.known / motion.units
     weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
-    excess = np.linalg.solve(axles.arms, np.where(motion.seen, motion.accelerations, 0.0))
+    excess = np.linalg.solve(
+        axles.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
+    )
     share = excess / axles.loads
     told = " and ".join(
         _excess_text(*each)
@@ -148,15 +150,17 @@ def _imbalance_findings(axles: AxleForces) -> list[Finding]:
         "vehicle's masses and a, b; a vehicle that brakes or accelerates has forces along the road, too, which "
         "this model has not."
     )
-    kind = "balance" if motion.seen[1] else "weight"
-    size = float(motion.shares[1] if motion.seen[1] else motion.shares[0])
+    kind = "balance" if motion.is_beyond_uncertainty[1] else "weight"
+    size = float(motion.shares_of_load[1] if motion.is_beyond_uncertainty[1] else motion.shares_of_load[0])
     return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", axles.names)]
 
 
 def _travels_too_far(axles: AxleForces, motion: SteadyResidual) -> np.ndarray:
     """Which of the two steady accelerations (2,), heave and pitch, moves the vehicle farther during the run than a road
     does."""
-    return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [LARGEST_HEIGHT, STEEPEST_GRADE])
+    return motion.is_beyond_uncertainty & (
+        np.abs(motion.accelerations) * axles.duration**2 / 2 > [LARGEST_HEIGHT, STEEPEST_GRADE]
+    )
 
 
 def _excess_text(name: str, excess: float, share: float) -> str:
@@ -166,8 +170,12 @@ def _excess_text(name: str, excess: float, share: float) -> str:
 def _motion_text(axles: AxleForces, motion: SteadyResidual) -> str:
     """Text on how far the steady accelerations move the vehicle during the run."""
     risen, turned = motion.accelerations * axles.duration**2 / 2
-    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.seen[0] else []
-    parts += [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"] if motion.seen[1] else []
+    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.is_beyond_uncertainty[0] else []
+    parts += (
+        [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"]
+        if motion.is_beyond_uncertainty[1]
+        else []
+    )
     return f"a vehicle free to move {' and '.join(parts)} in {axles.duration:g} s"
 
 
@@ -176,7 +184,7 @@ def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
     first = axles.forces[0] / axles.loads - 1
     last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
     if (
-        not axles.rests
+        not axles.starts_at_rest
         or axles.parameters.g == 0
         or np.abs(first).max() < START_LOAD_SHARE
         or abs(last) < max(STEEPEST_GRADE, _noise(axles))
@@ -198,7 +206,7 @@ def _noise(axles: AxleForces) -> float:
     signals.
     """
     rough = float(np.diff(axles.forces, 3, axis=0).std()) / 20**0.5
-    return 4 * (axles.rigid.intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
+    return 4 * (axles.rigid.noise_intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
 def _constant_axle(axles: AxleForces) -> list[Finding]:
@@ -272,11 +280,11 @@ def unchecked_delay_sentence(axles: AxleForces) -> str:
 def _weights_agree(axles: AxleForces) -> Finding:
     motion = equilibrium_residual(axles)
     text = (
-        f"The mean wheel forces carry the vehicle to {motion.shares[0]:+.2%} of its weight; an error of "
+        f"The mean wheel forces carry the vehicle to {motion.shares_of_load[0]:+.2%} of its weight; an error of "
         f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-        f"{100 * abs(motion.known[1] / (axles.arms[1] * axles.loads)).max():.2g} %."
+        f"{100 * abs(motion.known[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
     )
-    return Finding("weight", "note", "", text, 100 * float(motion.shares[0]), "%", axles.names)
+    return Finding("weight", "note", "", text, 100 * float(motion.shares_of_load[0]), "%", axles.names)
 
 
 def _error(axles: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:

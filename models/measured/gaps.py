@@ -43,12 +43,14 @@ MISSING_VALUE_MARK = 1e30
 
 @dataclass(frozen=True)
 class Gap:
-    """A gap: samples from ``first`` to before ``end``. ``doubt`` (in the channel's unit) is the largest standard
-    deviation of the filled values, NaN if the gap is not filled because it is too long or has no neighbours."""
+    """A gap: samples from ``first`` to before ``end``. ``largest_deviation`` (in the channel's unit) is the largest
+    standard deviation of the filled values, NaN if the gap is not filled because it is too long or has no
+    neighbours.
+    """
 
     first: int
     end: int
-    doubt: float
+    largest_deviation: float
 
 
 def true_runs(holds: np.ndarray) -> np.ndarray:
@@ -84,7 +86,7 @@ def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, l
     too long."""
     period = recording.period
     values, gaps = filled_samples(recording.samples(signal), period, LONGEST_BRIDGED_GAP)
-    for gap in (gap for gap in gaps if np.isnan(gap.doubt)):
+    for gap in (gap for gap in gaps if np.isnan(gap.largest_deviation)):
         text = (
             f"is silent from {gap.first * period:.6g} s to {gap.end * period:.6g} s: gaps of at most "
             f"{LONGEST_BRIDGED_GAP:g} s are "
@@ -93,10 +95,11 @@ def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, l
         raise InputError(signal.file, signal.channel, None, text)
     if not gaps:
         return values, gaps, ()
-    longest, worst = max(gap.end - gap.first for gap in gaps) * period, max(gaps, key=lambda gap: gap.doubt)
+    longest, worst = max(gap.end - gap.first for gap in gaps) * period, max(gaps, key=lambda gap: gap.largest_deviation)
     text = (
         f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged by what the channel itself "
-        f"makes most likely, with a standard deviation of {worst.doubt:.3g} {UNIT_OF_QUANTITY[signal.quantity]} at "
+        f"makes most likely, with a standard deviation of {worst.largest_deviation:.3g} "
+        f"{UNIT_OF_QUANTITY[signal.quantity]} at "
         f"{worst.first * period:.6g} s, the largest."
     )
     times = gaps[0].first * period, gaps[-1].end * period

@@ -135,7 +135,7 @@ class _Builder:
         spinning = set[int]()
         for joint, wheel in self.roles.spin.items():
             body = int(self.model.jnt_bodyid[joint])
-            turned = [b for b in self.leaders if self._rides(b, body)]
+            turned = [b for b in self.leaders if self._rides_on_suspension(b, body)]
             behind = [j for b in turned for j in joints_of(self.model, b) if j > joint]
             if behind:
                 said = f"lies behind {joint_text(self.model, self.document, joint)}, which spins a wheel: nothing may"
@@ -149,7 +149,7 @@ class _Builder:
             spinning.update(turned)
         return spinning
 
-    def _rides(self, body: int, on: int) -> bool:
+    def _rides_on_suspension(self, body: int, on: int) -> bool:
         while body and body != on:
             body = int(self.model.body_parentid[body])
         return body == on

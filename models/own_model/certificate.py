@@ -56,7 +56,7 @@ class Reference:
     that are judged together with it (n,), its motion at some states, and the sensitivity of this motion to rounding."""
 
     names: tuple[str, ...]
-    together: tuple[slice, ...]
+    judged_together: tuple[slice, ...]
     moved: list[Moved]
     sensitivities: list[Moved]
 
@@ -199,7 +199,7 @@ def _scales_at_state(expected: Reference, state: int) -> tuple[Moved, Moved]:
     moved, sensitive = expected.moved[state], expected.sensitivities[state]
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
-    acceleration = np.array([acceleration[together].max() for together in expected.together])
+    acceleration = np.array([acceleration[together].max() for together in expected.judged_together])
     own = Moved(np.outer(inertia, inertia), force, acceleration)
     allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
     return own, Moved(*(allowed * each for each in sensitive))

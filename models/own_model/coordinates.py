@@ -35,7 +35,7 @@ class Turning:
 
     first: int
     place: int
-    design: np.ndarray
+    design_axes: np.ndarray
     free: bool
 
 
@@ -74,9 +74,13 @@ class Coordinates:
         for turning in self.turnings:
             at = slice(turning.first, turning.first + 3)
             rotation, rates, bias = turned_by_angles(q[at], v[at])
-            lies = rotation @ turning.design if turning.free else turning.design.T @ rotation @ turning.design
+            lies = (
+                rotation @ turning.design_axes
+                if turning.free
+                else turning.design_axes.T @ rotation @ turning.design_axes
+            )
             mujoco.mju_mat2Quat(qpos[turning.place : turning.place + 4], np.ascontiguousarray(lies).ravel())
-            jacobian[at, at], rest[at] = turning.design.T @ rates, turning.design.T @ bias
+            jacobian[at, at], rest[at] = turning.design_axes.T @ rates, turning.design_axes.T @ bias
         return MujocoState(qpos, jacobian @ v, jacobian, rest)
 
 

@@ -39,7 +39,7 @@ class Element:
         return self.kind, self.owner
 
     @property
-    def says(self) -> bool:
+    def is_nonzero(self) -> bool:
         """Whether the value is not zero."""
         return value_is_nonzero(self.value)
 
@@ -48,7 +48,7 @@ class Element:
         """The value with its unit as text."""
         return value_text(self.value, self.unit)
 
-    def same(self, other: "Element") -> bool:
+    def has_same_value(self, other: "Element") -> bool:
         """Whether both have the same value."""
         if is_word(self.value) or is_word(other.value):
             return bool(np.array_equal(self.value, other.value))

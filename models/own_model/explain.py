@@ -80,7 +80,7 @@ class Comparison:
     """Comparison of two files: agreement of their accelerations; different elements, the most influential first; the
     remaining disagreement when all of these are taken over; and coordinates that only one file has."""
 
-    apart: Agreement | None
+    acceleration_agreement: Agreement | None
     differences: tuple[Difference, ...]
     unexplained: float
     unmatched: tuple[str, ...]
@@ -88,7 +88,7 @@ class Comparison:
     @property
     def alike(self) -> bool:
         """Whether both move alike."""
-        return self.apart is not None and self.apart.alike
+        return self.acceleration_agreement is not None and self.acceleration_agreement.alike
 
     @property
     def influential(self) -> tuple[Difference, ...]:
@@ -103,7 +103,7 @@ class Comparison:
         return tuple(each for each in self.differences if each.off)
 
     @property
-    def silent(self) -> tuple[Difference, ...]:
+    def silent_differences(self) -> tuple[Difference, ...]:
         """Differences that change neither accelerations nor the mass matrix."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
@@ -230,7 +230,7 @@ def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Tri
     rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
         element, other = listed.get(key), others.get(key)
-        if element is not None and other is not None and element.same(other):
+        if element is not None and other is not None and element.has_same_value(other):
             continue
         there = element if element is not None else other
         if there is None or _says_nothing(there, element, other):
@@ -268,7 +268,7 @@ def _only_turned(kind: str, element: Element | None, other: Element | None) -> b
 
 def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
     """Whether an element that only one file has is insignificant: zero, or a word that repeats other elements."""
-    return (element is None or other is None) and (is_word(there.value) or not there.says)
+    return (element is None or other is None) and (is_word(there.value) or not there.is_nonzero)
 
 
 def removals_that_agree(twin: TwinModel, build: str, count: int = STATE_COUNT) -> list[tuple[Element, float]]:
@@ -280,7 +280,7 @@ def removals_that_agree(twin: TwinModel, build: str, count: int = STATE_COUNT) -
     rows = list[tuple[Element, float]]()
     for key, element in elements_of_model(twin.model).items():
         model = copy(twin.model)
-        if not element.says or not drop(model, key):
+        if not element.is_nonzero or not drop(model, key):
             continue
         less = described_model(model, twin.name)
         seen = agreement_of_build(

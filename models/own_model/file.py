@@ -29,15 +29,15 @@ LARGEST_NUMBER = 1e30
 class ModelFile:
     """A file that was read.
 
-    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out; limited :
-    joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes : sentences on
-    what reading passed over.
+    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out;
+    ignored_limits : joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes :
+    sentences on what reading passed over.
     """
 
     document: Document
     twin: TwinModel
     left_out: tuple[Content, ...]
-    limited: tuple[str, ...]
+    ignored_limits: tuple[str, ...]
     notes: tuple[str, ...]
 
 

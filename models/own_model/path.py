@@ -39,8 +39,9 @@ FILE_BUILD_NAME = "the file's own model"
 
 @dataclass(frozen=True)
 class PathReport:
-    """step (s); horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other build from
-    the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
+    """step (s); comparison_horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other
+    build from the first one up to there, relative; failed : what stopped a build; has_quaternions : whether the file's
+    has them;
     energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy;
     has_soft_constraints : whether MuJoCo has soft constraints, so that its path is another one: from it the file's is
     counted then;
@@ -50,10 +51,10 @@ class PathReport:
     """
 
     step: float
-    horizon: float
+    comparison_horizon: float
     distances: dict[str, float]
     failed: dict[str, str]
-    quaternions: bool
+    has_quaternions: bool
     energy: float | None
     has_soft_constraints: bool = False
     has_dry_friction: bool = False
@@ -63,7 +64,7 @@ class PathReport:
     @property
     def alike(self) -> bool:
         """Whether all builds have the same path; the file's own path counts only if it has the same coordinates."""
-        others = {FILE_BUILD_NAME: self.quaternions, SOFT_BUILD: self.has_soft_constraints}
+        others = {FILE_BUILD_NAME: self.has_quaternions, SOFT_BUILD: self.has_soft_constraints}
         held = [size for name, size in self.distances.items() if not others.get(name)]
         return bool(held) and max(held) <= EQUAL_PATH_SHARE
 
@@ -76,20 +77,22 @@ class PathReport:
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
         if self.struck_limit:
             rows.append(
-                f"  compared up to {self.horizon:.3g} s, where {self.struck_limit} strikes its limit, "
+                f"  compared up to {self.comparison_horizon:.3g} s, where {self.struck_limit} strikes its limit, "
                 "which is not built"
             )
-        elif not self.horizon:
+        elif not self.comparison_horizon:
             rows.append("  not compared: this step is too long for the motion; give the file a shorter one")
-        elif self.horizon < PATH_DURATION:
+        elif self.comparison_horizon < PATH_DURATION:
             rows.append(
-                f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBANCE:g} "
+                f"  compared up to {self.comparison_horizon:.3g} s, where a disturbance of {DISTURBANCE:g} "
                 f"reaches {EQUAL_PATH_SHARE:g}"
                 f"{', or dry friction sticks' if self.has_dry_friction else ''}"
             )
         for name, size in self.distances.items():
             turned = (
-                " (quaternions: distance of the step's error)" if name == FILE_BUILD_NAME and self.quaternions else ""
+                " (quaternions: distance of the step's error)"
+                if name == FILE_BUILD_NAME and self.has_quaternions
+                else ""
             )
             given = " (soft constraints give way)" if name == SOFT_BUILD and self.has_soft_constraints else ""
             first = SOFT_BUILD if name == FILE_BUILD_NAME and self.has_soft_constraints else ENGINES[0]

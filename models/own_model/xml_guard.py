@@ -29,7 +29,7 @@ class XmlElement:
     attributes: dict[str, str]
     file: str
     line: int
-    around: tuple[str, ...]
+    enclosing_tags: tuple[str, ...]
 
 
 @dataclass(frozen=True)

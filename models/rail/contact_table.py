@@ -126,19 +126,19 @@ class LoadedWheel:
     wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
-    known. approach : vertical (m). lifted : vertical part of the creep forces, upwards on the rail (N). normal : that
-    of the normal forces (N). moment : of the creep forces about the axle (N m).
+    known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N). normal :
+    that of the normal forces (N). moment : of the creep forces about the axle (N m).
     """
 
     pose: Pose
     touches: list[TouchingPlace]
     creepages: list[Triple]
-    pressed: NormalContact
+    normal_contact: NormalContact
     approach: float
     normal: float
     forces: Sequence[Triple] = ()
     shares: Sequence[Share] = ()
-    lifted: float = 0.0
+    creep_lift: float = 0.0
     moment: float = 0.0
 
     @property
@@ -150,20 +150,20 @@ class LoadedWheel:
 
     def part(self, touch: TouchingPlace) -> PatchPressure | None:
         """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
-        return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
+        return next((part for part in self.normal_contact.patches if part.patch is touch.patch), None)
 
 
 @dataclass(frozen=True, eq=False)
 class WheelsetContact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
+    0 for a smooth contact. cell_factor : how many times as large as usual cells are, which tells their error."""
 
     side: WheelAndRail
     load: float
     speed: float
     friction: float = 0.0
     pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
-    coarser: float = 1.0
+    cell_factor: float = 1.0
 
     def at(self, shift: float, yaw: float = 0.0) -> WheelsetPlacement:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
@@ -216,7 +216,7 @@ class WheelsetContact:
 
         def by_normal(normal: float) -> LoadedWheel:
             shares, approach = press_exactly(
-                patches, approximate.pressed.patches, normal, approximate.approach, self.pair, self.coarser
+                patches, approximate.normal_contact.patches, normal, approximate.approach, self.pair, self.cell_factor
             )
             return replace(approximate, shares=shares, approach=approach, normal=normal)
 
@@ -227,9 +227,9 @@ class WheelsetContact:
         wheel for a vertical part (N) of the normal forces, which is iterated from ``normal``."""
         for _ in range(ITERATIONS):
             wheel = self._rolled(by_normal(normal))
-            if abs(normal - wheel.lifted - self.load) < LOAD_PRECISION * self.load:
+            if abs(normal - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
                 return wheel
-            normal *= self.load / (normal - wheel.lifted)
+            normal *= self.load / (normal - wheel.creep_lift)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
@@ -257,13 +257,13 @@ class WheelsetContact:
             if part is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
-            alone = replace(wheel.pressed, patches=(replace(part, load=load),))
-            creep = roll(alone, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.coarser))
+            alone = replace(wheel.normal_contact, patches=(replace(part, load=load),))
+            creep = roll(alone, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
         moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
-        return replace(wheel, forces=forces, lifted=lifted, moment=moment)
+        return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
 
     def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
         """Creepages and spin (1/m) at a point of first touch."""

@@ -86,7 +86,7 @@ class Body(NamedTuple):
 class Stages(NamedTuple):
     """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
-    total: Array
+    summed_rate: Array
     rate: Array
     stage_state: Array
     empty_report: Array
@@ -320,7 +320,7 @@ class Equations:
         return rate_jacobian(self.rates, self.rest)
 
     @cached_property
-    def _fastest(self) -> float:
+    def _fastest_rate(self) -> float:
         """Largest eigenvalue magnitude (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
@@ -372,13 +372,13 @@ class Equations:
         """Number of steps of a run, after checks of state, duration, step and stride."""
         if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
             raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")
-        if not 0.0 < number("step", step, "a step in s") * self._fastest <= ALLOWED_STEP_RATE:
+        if not 0.0 < number("step", step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
             raise InputError(
                 "",
                 "step",
                 step,
-                f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest:.3g} s: the "
-                f"fastest motion has a rate of {self._fastest:.4g} 1/s",
+                f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest_rate:.3g} s: the "
+                f"fastest motion has a rate of {self._fastest_rate:.4g} 1/s",
             )
         if not divides(step, number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")

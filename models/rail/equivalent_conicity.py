@@ -269,7 +269,7 @@ def conicity_row(table: RollingRadiusTable, amplitude: float, *, guess: float | 
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.thinned(), amplitude, guess=wave.centre).conicity
+        coarse = klingel_wave(table.without_every_second_row(), amplitude, guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -103,7 +103,7 @@ class RollingRadiusTable:
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
-    def thinned(self) -> "RollingRadiusTable":
+    def without_every_second_row(self) -> "RollingRadiusTable":
         """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
         kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
         return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])

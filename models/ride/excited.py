@@ -99,7 +99,7 @@ class VehicleStates:
     """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
-    massless_part, slow: a and b by q.
+    massless_part, integrated_part: a and b by q.
     """
 
     A: np.ndarray
@@ -107,7 +107,7 @@ class VehicleStates:
     Q: np.ndarray
     direct: np.ndarray
     massless_part: np.ndarray
-    slow: np.ndarray
+    integrated_part: np.ndarray
 
 
 def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:

@@ -50,7 +50,7 @@ class MarginalParts:
 
     M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
-    scale (n,): sizes of the states that balance A; rounding is relative to them. fastest: norm of A, 1/s.
+    scale (n,): sizes of the states that balance A; rounding is relative to them. norm_of_rates: norm of A, 1/s.
     neglected_rate_ratio: largest rate that was taken for 0, by the slowest of the stable part.
     """
 
@@ -62,7 +62,7 @@ class MarginalParts:
     W: np.ndarray
     zeros: int
     scale: np.ndarray
-    fastest: float
+    norm_of_rates: float
     neglected_rate_ratio: float
 
     @property
@@ -246,7 +246,7 @@ def variance_growth(
     seen = C @ split.V0
     seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
     z, least = split.zeros, ZERO_MARGIN * accuracy
-    most = least * variance * 2 * accuracy * split.fastest
+    most = least * variance * 2 * accuracy * split.norm_of_rates
     rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least, most)
     swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least, most)
     rate = np.where(power <= 1, rate + swung, rate)

@@ -173,13 +173,13 @@ class _Cells:
         for duration in durations:
             met.append(next(draws))
             if duration != before:
-                E, R = self._crossed(duration)
+                E, R = self._cell_transition(duration)
                 before = duration
             noise = [met[-1]] if independent else [met[-1 - shift] for shift in self.shifts]
             x = E @ x + R @ np.concatenate(noise)
             yield x
 
-    def _crossed(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    def _cell_transition(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
         """Transition matrix (n, n) over a cell, and responses (n, a k LEGENDRE_MODES) to the noise in it, axle by
         axle.
         """

@@ -38,14 +38,14 @@ SLOWEST_DECAY_SHARE = 1e-6
 class Copies:
     """Outputs of the copies in time: per copy (copies, p) the means of y, y^2, y^3 and y^4 over the counted time.
 
-    step (s) of the runs, ``duration`` (s) that counts after ``settling`` steps.
+    step (s) of the runs, ``duration`` (s) that counts after ``settling_steps`` steps.
     """
 
     names: tuple[str, ...]
     moments: np.ndarray
     step: float
     duration: float
-    settling: int
+    settling_steps: int
 
     @property
     def mean(self) -> np.ndarray:
@@ -112,7 +112,7 @@ def copies_in_time(
     march = CopiesMarch(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
         left = settling + counted - number * STEPS_PER_BLOCK
-        march.over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * STEPS_PER_BLOCK))
+        march.march_over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * STEPS_PER_BLOCK))
         if left <= STEPS_PER_BLOCK:
             break
     moments = march.sums.swapaxes(1, 2) / len(range(0, counted, STEPS_PER_READING))
@@ -130,12 +130,12 @@ def coarser_variances(
     long."""
     copies = len(fine.moments[0])
     kept, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine.step / 2.0)
-    settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
+    settling, counted = fine.settling_steps // times, round(fine.duration / fine.step) // times
     block, every = STEPS_PER_BLOCK // times, STEPS_PER_READING // times
     march = CopiesMarch(vehicle, speed, times * fine.step, kept)
     for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
         left = settling + counted - number * block
-        march.over(
+        march.march_over(
             portion[: 2 * times * left + 1 : times, :, :kept].copy(),
             _steps_to_first_output(settling, number * block, every),
             every,
@@ -157,7 +157,7 @@ class CopiesMarch:
         self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
+    def march_over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
         """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
         ``first``."""
         if self.states is None:

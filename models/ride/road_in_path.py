@@ -36,7 +36,7 @@ class RoadInPath:
     """
 
     A: np.ndarray
-    inputs: np.ndarray
+    noise_inputs: np.ndarray
     basis: np.ndarray
     C: np.ndarray
     rate: np.ndarray
@@ -100,9 +100,11 @@ class Responses:
     def __init__(self, road_in_path: RoadInPath, profile: SpeedProfile) -> None:
         F, G = road_in_path.excitation.F, road_in_path.excitation.G
         self.form, self.profile, self.path = road_in_path, profile, profile.path
-        self.n, self.axles, self.m = road_in_path.inputs.shape
+        self.n, self.axles, self.m = road_in_path.noise_inputs.shape
         self.decay, self.noise = exponential_series(F, np.eye(self.m)), exponential_series(F, G)
-        self.motion = [exponential_series(road_in_path.A, road_in_path.inputs[:, axle]) for axle in range(self.axles)]
+        self.motion = [
+            exponential_series(road_in_path.A, road_in_path.noise_inputs[:, axle]) for axle in range(self.axles)
+        ]
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
     def transition(self, start: float, end: float) -> np.ndarray:
@@ -121,7 +123,7 @@ class Responses:
         """Matrix exponential e^(A h) over a length h, and the effect of inputs at the points of the step through e^(A
         (h - u)): (n a, g m)."""
         left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in UNIT_POINTS])
-        inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.inputs, optimize=True)
+        inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
     def to_noise(self, axle: int, met: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ class BentSpring:
     ``left_out``: share of the variance of its force that the gains leave out.
     """
 
-    gains: Gains
+    equivalent_gains: Gains
     travel: float
     deviation: float
     rate: float
@@ -65,7 +65,7 @@ class StatisticallyLinear:
     """The statistically linearised vehicle, its covariance and its means.
 
     mean, left_out (p,), by output: mean beside the equilibrium on a flat road (0 for accelerations), and the variance
-    that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``changes``: largest
+    that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``gain_changes``: largest
     relative change of a gain, iteration after iteration; the last one is that of a fixed point.
     """
 
@@ -76,20 +76,20 @@ class StatisticallyLinear:
     springs: dict[str, BentSpring]
     left_out: np.ndarray
     sentences: tuple[str, ...]
-    changes: tuple[float, ...]
+    gain_changes: tuple[float, ...]
 
     @property
     def contraction(self) -> float:
         """Largest ratio of a change to the change one iteration before, among changes above rounding."""
-        seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * GAIN_TOLERANCE]
+        seen = [after / before for before, after in pairwise(self.gain_changes) if after > 100.0 * GAIN_TOLERANCE]
         return max(seen[len(seen) // 2 :], default=0.0)
 
     @property
-    def distance(self) -> float:
+    def fixed_point_distance(self) -> float:
         """Largest relative distance of the gains from the fixed point: last change * c / (1 - c) with contraction c,
         Banach's bound."""
         c = self.contraction
-        return self.changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
+        return self.gain_changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
 
 
 def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
@@ -114,7 +114,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).solved(scale)
+    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(scale)
 
 
 Law = tuple[float, float, float]
@@ -144,7 +144,7 @@ class _Search:
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
-    def solved(self, scale: float) -> StatisticallyLinear:
+    def iterate_to_fixed_point(self, scale: float) -> StatisticallyLinear:
         """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
         first = _Moments(
@@ -152,12 +152,12 @@ class _Search:
             np.full(count, scale * FIRST_TRAVEL_DEVIATION),
             np.full(count, scale * FIRST_RATE_DEVIATION),
         )
-        gains, position = self._gains(first), np.zeros(len(self.plain.mass))
+        gains, position = self._equivalent_gains(first), np.zeros(len(self.plain.mass))
         changes: list[float] = []
         part = 1.0
         while not changes or changes[-1] > GAIN_TOLERANCE:
             moments, position = self._spring_moments(gains, position)
-            wanted = self._gains(moments)
+            wanted = self._equivalent_gains(moments)
             changes.append(_largest_gain_change(wanted, gains))
             if len(changes) >= MOST_ROUNDS:
                 raise RunFailed(
@@ -170,13 +170,13 @@ class _Search:
             gains = gains + part * (wanted - gains)
         return self._result(gains, moments, position, changes)
 
-    def _gains(self, moments: _Moments) -> np.ndarray:
+    def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
         """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
-        laws = zip(self.springs, self._laws(moments), strict=True)
+        laws = zip(self.springs, self._linearised_laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
+    def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
         """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
         the force that the gain does not represent."""
         moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
@@ -195,10 +195,10 @@ class _Search:
         if not np.isfinite(deviation).all():
             raise RunFailed("statistical linearisation", "the travel of a bent spring has no finite variance here")
         travel, rate = np.split(deviation, 2)
-        position = self._mean(travel, rate, position)
+        position = self._mean_position(travel, rate, position)
         return _Moments(self.rows @ position, travel, rate), position
 
-    def _mean(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
+    def _mean_position(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
         stay 0."""
         damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
@@ -219,16 +219,23 @@ class _Search:
         system = vehicle_with_road(linear, self.excitation, self.speed)
         covariance = stationary_covariance(system)
         left = self._left_out(linear, moments, system, covariance)
-        springs = {s.name: self._spring(i, gains[i], moments) for i, s in enumerate(self.springs)}
+        springs = {s.name: self._spring_in_motion(i, gains[i], moments) for i, s in enumerate(self.springs)}
         told = zip(covariance.names, left, covariance.status, strict=True)
         sentences = tuple(_left_out_sentence(*each) for each in told)
         return StatisticallyLinear(
-            linear, system, covariance, self._means(springs, linear, position), springs, left, sentences, tuple(changes)
+            linear,
+            system,
+            covariance,
+            self._output_means(springs, linear, position),
+            springs,
+            left,
+            sentences,
+            tuple(changes),
         )
 
-    def _spring(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
+    def _spring_in_motion(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
         s, mean, d, r = self.springs[i], float(moments.mean[i]), float(moments.travel[i]), float(moments.rate[i])
-        travel, rate = self._laws(moments)[i]
+        travel, rate = self._linearised_laws(moments)[i]
         lost = travel[2] + rate[2]
         total = lost + (gains[0] * d) ** 2 + (gains[1] * r) ** 2
         return BentSpring(
@@ -240,7 +247,7 @@ class _Search:
             float(lost / total) if total else 0.0,
         )
 
-    def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
+    def _output_means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
         """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
         means = np.array([output.displacement_factors @ position for output in linear.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
@@ -261,7 +268,7 @@ class _Search:
         corners = np.concatenate(
             [_corner_frequency(moments.rate, moments.travel), _corner_frequency(change, moments.rate)]
         )
-        lost = np.array([[law[2] for law in laws] for laws in self._laws(moments)]).T.ravel()
+        lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(moments)]).T.ravel()
         forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._own_forces())
         noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary_covariance(

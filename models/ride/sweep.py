@@ -34,7 +34,7 @@ class Sweep:
     """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
     units (outputs,).
 
-    ``direct``: number of points computed by the direct method, by the reason for not using the fast one.
+    ``direct_counts``: number of points computed by the direct method, by the reason for not using the fast one.
     """
 
     cases: tuple[str, ...]
@@ -44,7 +44,7 @@ class Sweep:
     variance: np.ndarray
     status: np.ndarray
     reason: np.ndarray
-    direct: Mapping[str, int]
+    direct_counts: Mapping[str, int]
 
     @property
     def deviation(self) -> np.ndarray:
@@ -113,7 +113,7 @@ def _fast_variances(
         return quick
     none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
     status, reason = variance_verdicts(
-        noise_arrivals(system).D, quick.variance, quick.floor, none, quick.fastest, accuracy
+        noise_arrivals(system).D, quick.variance, quick.rounding_floor, none, quick.fastest_rate, accuracy
     )
     finite = np.array(status) == FINITE
     if (quick.relative_error[finite] > LARGEST_FAST_ERROR).any():
@@ -174,16 +174,16 @@ class SharedModes:
 
 @dataclass(frozen=True)
 class ModalVariances:
-    """Results per output (p,): variance, ``floor`` that rounding makes of a zero variance, and bound
+    """Results per output (p,): variance, ``rounding_floor`` that rounding makes of a zero variance, and bound
     ``relative_error``.
 
-    fastest : rate of the system in 1/s
+    fastest_rate : rate of the system in 1/s
     """
 
     variance: np.ndarray
-    floor: np.ndarray
+    rounding_floor: np.ndarray
     relative_error: np.ndarray
-    fastest: float
+    fastest_rate: float
 
 
 def modal_variances(

@@ -234,7 +234,7 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
     position."""
     F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
-    n, axles, m = road_in_path.inputs.shape
+    n, axles, m = road_in_path.noise_inputs.shape
     if not len(behind):
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
     after = np.zeros((axles * m, len(behind), G.shape[1]))
@@ -252,7 +252,7 @@ def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
             "must be above 0: this vehicle has a motion that nothing pulls "
             "back, so it knows no state of rest to begin in",
         )
-    inputs = road_in_path.inputs.reshape(len(road_in_path.A), -1)
+    inputs = road_in_path.noise_inputs.reshape(len(road_in_path.A), -1)
     return np.vstack([-np.linalg.solve(road_in_path.A, inputs), np.eye(inputs.shape[1])])
 
 

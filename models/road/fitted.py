@@ -21,7 +21,7 @@ HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
 class FilterFit:
     """First-order filter fitted to a density between ``low`` and ``high`` (rad/m).
 
-    corner_error, intensity_error: relative standard errors from the scatter about the fit. ``residual``: rms of
+    corner_error, intensity_error: relative standard errors from the scatter about the fit. ``log_residual``: rms of
     ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``corner_is_resolved`` if it lies
     within the band and is known to half of itself; it is never sought below a tenth of ``low``.
     """
@@ -29,7 +29,7 @@ class FilterFit:
     filter: ShapeFilter
     corner_error: float
     intensity_error: float
-    residual: float
+    log_residual: float
     low: float
     high: float
     corner_is_resolved: bool
@@ -130,7 +130,7 @@ def _band_averages(
 def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
     """Sentences on limits of the data that no fit can remove."""
     least = spectra.wavenumber[0]
-    low, high = spectra.band()
+    low, high = spectra.confidence_factors()
     return [
         f"{tracks.length:g} m in {spectra.windows} windows: nothing is known of waves longer than "
         f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
@@ -153,7 +153,7 @@ def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | 
                 f"the corner of the {name} process is not told by this road: only its level above "
                 f"{fitted.low:.3g} rad/m is; do not read its variance"
             )
-        if fitted.residual > math.log(2.0):
+        if fitted.log_residual > math.log(2.0):
             said.append(
                 f"the {name} process is not of first order: the fit is off by a factor "
                 f"{_scatter_factor(fitted):.1f} (rms)"
@@ -170,4 +170,4 @@ def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | 
 
 
 def _scatter_factor(fitted: FilterFit) -> float:
-    return math.exp(fitted.residual)
+    return math.exp(fitted.log_residual)

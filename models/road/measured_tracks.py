@@ -58,7 +58,7 @@ class TrackSpectra:
         """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
-    def band(self, level: float = 0.95) -> tuple[float, float]:
+    def confidence_factors(self, level: float = 0.95) -> tuple[float, float]:
         """Factors by which to multiply a density to get its confidence interval at probability ``level``."""
         from scipy.stats import chi2
 

@@ -35,7 +35,7 @@ class RoadProfile(Protocol):
         ...
 
     @property
-    def finest(self) -> float:
+    def finest_detail(self) -> float:
         """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 
@@ -201,7 +201,7 @@ class SplineProfile:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         flat, shape = _flat_stations(s)
         if flat.size:
-            self._check(float(flat.min()), float(flat.max()))
+            self._check_extent(float(flat.min()), float(flat.max()))
         height, slope = np.empty_like(flat), np.empty_like(flat)
         kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
@@ -210,7 +210,7 @@ class SplineProfile:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
         start, step = _checked_number(start, "start"), _checked_number(step, "step")
         last = start + max(count - 1, 0) * step
-        self._check(min(start, last), max(start, last))
+        self._check_extent(min(start, last), max(start, last))
         height, slope = np.empty(count), np.empty(count)
         road = (self.station, self.coefficients, self.window_length)
         kernels.cubics_uniform(start, step, *road, height, slope)
@@ -218,10 +218,10 @@ class SplineProfile:
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        self._check(s, s)
+        self._check_extent(s, s)
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
-    def _check(self, first: float, last: float) -> None:
+    def _check_extent(self, first: float, last: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent

@@ -47,7 +47,7 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
             "sample faster (sampling_rate)",
             partial(_as_known, {"body": turned}),
             "rad per sample",
-            most=LARGEST_TURN_PER_SAMPLE,
+            upper_limit=LARGEST_TURN_PER_SAMPLE,
         ),
     ]
     if record.quality.rigid is not None and not record.quality.suspect:
@@ -56,7 +56,9 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
         says, remedy = "the record begins at rest and level", "begin it where the body stands level"
         tilt = _tilt_from_gravity(record.readings[0].mean(axis=0))
         listed.append(
-            Assumption("level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", most=LARGEST_LEVEL_TILT)
+            Assumption(
+                "level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", upper_limit=LARGEST_LEVEL_TILT
+            )
         )
     return listed
 
@@ -77,7 +79,7 @@ def _rigid_body_assumption(quality: Quality) -> Assumption:
         "mount them stiffer, leave out the one that gives way, or state their noise (deviation)",
         partial(_as_known, {"misfit": np.array([quality.share])}),
         "",
-        most=max(UNEXPLAINED_SHARE_LIMIT, NOISE_FACTOR * quality.expected / size),
+        upper_limit=max(UNEXPLAINED_SHARE_LIMIT, NOISE_FACTOR * quality.expected_misfit / size),
     )
 
 

@@ -48,7 +48,7 @@ def filter_rates(
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
-    values = np.column_stack([0.5 * (spins.gradient[:, i, j] + spins.gradient[:, j, i]) for i, j in pairs])
+    values = np.column_stack([0.5 * (spins.rate_matrix[:, i, j] + spins.rate_matrix[:, j, i]) for i, j in pairs])
     known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
         _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)

@@ -35,13 +35,13 @@ class Spin:
     """Differences of the readings at each instant, in the array's axes e1, e2, n: the matrix M of angular rates, and
     relative accelerations.
 
-    gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
-    relative : (n, 3, sensors) in m/s^2, readings less their mean
+    rate_matrix : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
+    relative_acceleration : (n, 3, sensors) in m/s^2, readings less their mean
     """
 
     array: SensorArray
-    gradient: np.ndarray
-    relative: np.ndarray
+    rate_matrix: np.ndarray
+    relative_acceleration: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Quality:
 
     misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
     share : its rms over the record divided by that of the relative accelerations
-    expected : what the stated noise of the readings alone would leave (m/s^2)
+    expected_misfit : what the stated noise of the readings alone would leave (m/s^2)
     redundancy : equations per sample behind it; 0 means that nothing can be said
     suspect : the sensor without which the body is rigid; "" if there is no single one
     """
 
     misfit: np.ndarray
     share: float
-    expected: float
+    expected_misfit: float
     redundancy: int
     suspect: str = ""
 
@@ -68,7 +68,7 @@ class Quality:
             return None
         return (
             self.share <= UNEXPLAINED_SHARE_LIMIT
-            or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected
+            or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected_misfit
         )
 
 
@@ -105,7 +105,7 @@ class RecoveredMotion:
     """alpha (rad/s^2) and rates (rad/s) local, quaternions, and the reference point's acceleration (m/s^2),
     velocity (m/s) and position (m) in global axes, all (n, 3) but quaternions (n, 4)."""
 
-    alpha: np.ndarray
+    angular_acceleration: np.ndarray
     rates: np.ndarray
     orientation: np.ndarray
     acceleration: np.ndarray
@@ -152,7 +152,7 @@ def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
 
 def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
     """Angular acceleration (n, 3) in the array's axes from the differences of readings; w (n, 3) in the same axes."""
-    m = spins.gradient
+    m = spins.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
     if spins.array.planar:
         about_first, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
@@ -168,7 +168,7 @@ def rates_up_to_sign(spins: Spin) -> np.ndarray:
     along the normal has a sign of its own, apart from that of the other two.
     """
     unsigned = _unsigned_in_plane if spins.array.planar else _unsigned_in_space
-    return unsigned(spins.gradient) @ spins.array.frame.T
+    return unsigned(spins.rate_matrix) @ spins.array.frame.T
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
@@ -194,10 +194,10 @@ def unexplained(spins: Spin) -> np.ndarray:
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
-    flat = _unsigned_in_plane(spins.gradient)
+    flat = _unsigned_in_plane(spins.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if spins.array.flat else [_unsigned_in_space(spins.gradient)]
-    left = np.stack([spins.relative - _nearest_rigid(spins, w) for w in offers])
+    offers += [] if spins.array.flat else [_unsigned_in_space(spins.rate_matrix)]
+    left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
     least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[least, np.arange(len(least))]
 
@@ -210,7 +210,7 @@ def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
     array, square = spins.array, skew_matrix(w) @ skew_matrix(w)
     weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
     rest = np.zeros_like(square)
-    rest[:, :, : array.weights.shape[1]] = spins.gradient
+    rest[:, :, : array.weights.shape[1]] = spins.rate_matrix
     moment = weights * (rest - square)
     turned = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
     return (turned + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
@@ -233,7 +233,7 @@ def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quali
     spins = spin_from_readings(array, readings)
     left = unexplained(spins)
     count = 3 * len(array.names)
-    size = float(np.sqrt(np.mean(spins.relative**2)))
+    size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
     share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
     return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
@@ -261,12 +261,12 @@ def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
     mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
     """
-    if len(spins.gradient) < 4:
-        raise InputError("", "readings", len(spins.gradient), "at least four samples are needed to integrate them")
+    if len(spins.rate_matrix) < 4:
+        raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
     first = np.asarray(start) @ spins.array.frame
     if not spins.array.planar:
         return time_integral(own_acceleration(spins, np.zeros((1, 3))), period, first) @ spins.array.frame.T
-    m = spins.gradient
+    m = spins.rate_matrix
     w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
     turn = np.exp(1j * time_integral(w3, period, np.array(0.0)))
     c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])

@@ -51,7 +51,7 @@ class SensorArray:
         """Whether the sensors lie in a plane, except for rounding."""
         return self.weights.shape[1] == 2
 
-    def gains(self, planar: bool | None = None) -> np.ndarray:
+    def noise_gains(self, planar: bool | None = None) -> np.ndarray:
         """Ratios (3,), in 1/m, of the standard deviation of the angular acceleration about x, y, z to that of the
         readings.
 
@@ -65,7 +65,7 @@ class SensorArray:
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
-        """Noise gains as ``gains``, about the array's axes e1, e2, n."""
+        """Noise gains as ``noise_gains``, about the array's axes e1, e2, n."""
         first, two, three = self.inverse_squares
         return np.sqrt(
             [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
@@ -89,14 +89,14 @@ class SensorArray:
                 f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified_noise()}; "
                 "the formula for a plane is used, integrated together with the rates"
             ]
-        gains = ", ".join(f"{value:.2f}" for value in self.gains())
+        gains = ", ".join(f"{value:.2f}" for value in self.noise_gains())
         lines += [f"noise of 1 m/s^2 in the readings gives ({gains}) rad/s^2 in roll, pitch and yaw acceleration"]
         if self.redundancy == 0:
             lines += ["three sensors leave nothing over to check that the body is rigid: a loose one is not found"]
         return lines
 
     def _amplified_noise(self) -> str:
-        return f"amplifies noise {max(self.gains(False) / self.gains(True)):.1f} times as much"
+        return f"amplifies noise {max(self.noise_gains(False) / self.noise_gains(True)):.1f} times as much"
 
 
 def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "auto") -> SensorArray:

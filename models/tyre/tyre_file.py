@@ -54,7 +54,7 @@ def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Line number (n,) of every row, and columns (n,) in SI; raises InputError for the first row with an error."""
     parts: list[RowBlock] = []
     for block in table_blocks(path, COLUMN_SETS):
-        for row, wrong in block.wrong.items():
+        for row, wrong in block.faulty_rows.items():
             raise InputError(path, f"line {block.lines[row]}", None, wrong)
         parts.append(block)
     if not parts:

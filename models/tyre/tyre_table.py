@@ -114,7 +114,7 @@ class TyreTable:
         mu_x, g, h = self._at_nodes(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
-    def figures(self, load: float) -> dict[str, float]:
+    def characteristic_values(self, load: float) -> dict[str, float]:
         """Characteristic values of a tyre under one load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]

@@ -48,7 +48,7 @@ def identify(
         if folder is None:
             return uncertainty(fit(problem, None, tell, executor=pool), pool)
         store = Store(folder / STAGES_FOLDER)
-        with store.claimed(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
+        with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
             return uncertainty(fit(problem, store, tell, executor=pool), pool)
 
 
@@ -130,7 +130,7 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
         "samples left out": {channel.name: channel.left_out for channel in solved.problem.channels},
         "converged": solved.converged,
         "profiles": {
-            each.name: {"values": each.values.tolist(), "rise": each.rise.tolist(), "quadratic": each.quadratic}
+            each.name: {"values": each.values.tolist(), "rise": each.rise.tolist(), "quadratic": each.is_quadratic}
             for each in profiles
         },
     }
@@ -181,7 +181,7 @@ def identification_lines(uncertainty: Uncertainty, profiles: Sequence[Likelihood
             f"  DOUBT: the measurement's clock seems {late:.4g} s later than the run's: take that off its times"
         )
     for curve in profiles:
-        shape = "as the standard error says" if curve.quadratic else "not as the standard error says"
+        shape = "as the standard error says" if curve.is_quadratic else "not as the standard error says"
         at = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
         table.append(f"  profile of {curve.name}: {at} (95 % below 3.84), {shape}")
     return table
@@ -194,7 +194,7 @@ def late_clock(uncertainty: Uncertainty) -> float:
     The model is that of the start: estimates take up a part of the delay.
     """
     problem, times = uncertainty.fit.problem, uncertainty.fit.problem.clock.times
-    measured = [np.where(channel.used, channel.values, np.nan) for channel in problem.channels]
+    measured = [np.where(channel.is_used, channel.values, np.nan) for channel in problem.channels]
     start = np.array([each.start for each in problem.parameters])
     pairs = [
         ChannelPair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)
@@ -242,7 +242,7 @@ def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
     count = len(problem.channels)
     figure, axes = subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
     for (top, below), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):
-        measured = np.where(channel.used, channel.values, np.nan)
+        measured = np.where(channel.is_used, channel.values, np.nan)
         top.plot(times, measured, color=DARK, linewidth=1.2, label="measured")
         top.plot(times, row, color=VERMILION, linewidth=0.8, label="model")
         top.set(title=channel.name, ylabel=f"[{channel.unit or '-'}]")

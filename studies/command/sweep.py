@@ -65,7 +65,7 @@ class Points:
         """``record`` (n,): the record of each point as JSON."""
         return _array_of_record(map(self.record, paths))
 
-    def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
+    def prepared_point(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point of the sweep; InputError if the point cannot be run."""
         scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
@@ -79,7 +79,7 @@ class Points:
         first: InputError | None = None
         for i in range(len(self.values)):
             try:
-                return self.ready(i)[0]
+                return self.prepared_point(i)[0]
             except InputError as error:
                 first = first or error
         assert first is not None
@@ -89,7 +89,7 @@ class Points:
         """Record of one point: its numbers by name, the failures (by engine, where the study gives them), and the
         errors and assumptions that its results state."""
         try:
-            scene, engines, study = self.ready(i)
+            scene, engines, study = self.prepared_point(i)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
             with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as place:
                 summary = study.run(scene, engines, place, lambda text, part: None)

@@ -63,7 +63,7 @@ class SweepResults:
     results: Sequence[Results]
     unit: str = "SI"
 
-    def broken(self, engine: str) -> list[int]:
+    def broken_points(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
         return [
             i
@@ -71,7 +71,7 @@ class SweepResults:
             if any(map(broken_of, _results_of_engine(results, engine).values()))
         ]
 
-    def warned(self, engine: str) -> list[int]:
+    def warned_points(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", has an error that is a warning."""
         shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
@@ -161,7 +161,7 @@ def _draw_panel(
 def _draw_marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
     """Draw open marks around the points of a curve at which a result broke an assumption or has an error that is a
     warning."""
-    for points, look in ((swept.broken(engine), BROKEN_MARK), (swept.warned(engine), WARNING_MARK)):
+    for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
         shown = [i for i in points if np.isfinite(values[i])]
         if shown:
             axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)

@@ -34,12 +34,12 @@ def _tell_nobody(what: str, share: float) -> None:
 
 @dataclass(frozen=True)
 class TwinOptions:
-    """Options of the command. states: number of random states at which accelerations are compared; paths: whether paths
-    are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints; controls:
-    file of the controls on the paths."""
+    """Options of the command. states: number of random states at which accelerations are compared; compare_paths:
+    whether paths are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints;
+    controls: file of the controls on the paths."""
 
     states: int = STATE_COUNT
-    paths: bool = True
+    compare_paths: bool = True
     tolerance: float | None = None
     quantity: str | None = None
     controls: Path | None = None
@@ -47,17 +47,19 @@ class TwinOptions:
 
 @dataclass(frozen=True, eq=False)
 class ExaminedFile:
-    """Results for one model file: the file as read and how well each build agrees with it. explained: for a build that
-    disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of paths,
-    None if not wanted; price: lines on the cost of accuracy; constraints: lines on dry friction and constraints."""
+    """Results for one model file: the file as read and how well each build agrees with it. explanations: for a build
+    that disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of
+    paths, None if not wanted; price_lines: lines on the cost of accuracy; constraint_lines: lines on dry friction and
+    constraints.
+    """
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
-    explained: dict[str, list[tuple[Element, float]]]
+    explanations: dict[str, list[tuple[Element, float]]]
     misread: tuple[Misread, ...]
     path: PathReport | None
-    price: tuple[str, ...] = ()
-    constraints: tuple[str, ...] = ()
+    price_lines: tuple[str, ...] = ()
+    constraint_lines: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -65,19 +67,19 @@ class ExaminedFile:
         return self.file.document.path.name
 
     @property
-    def certified(self) -> bool:
+    def is_certified(self) -> bool:
         """Whether all builds agree with the file, and MuJoCo's parser lost nothing."""
         return all(each.alike for each in self.agreements) and not self.misread
 
 
 @dataclass(frozen=True, eq=False)
 class Twins:
-    """Results of the command for one file or two. comparison: that of the two files; gap: how far their paths are
+    """Results of the command for one file or two. comparison: that of the two files; path_gap: how far their paths are
     apart, None if paths were not wanted or the files have different coordinates."""
 
     examined: tuple[ExaminedFile, ...]
     comparison: Comparison | None
-    gap: PathGap | None = None
+    path_gap: PathGap | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,7 +89,7 @@ class Twins:
     @property
     def alike(self) -> bool:
         """Whether all builds agree with their files, and both files with each other."""
-        files = all(each.certified for each in self.examined)
+        files = all(each.is_certified for each in self.examined)
         return files and (self.comparison is None or self.comparison.alike)
 
 
@@ -117,11 +119,11 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: TwinOptions, 
         raise InputError("--states", "", wanted.states, "must be 1 or more")
     if wanted.quantity is not None and wanted.tolerance is None:
         raise InputError("--quantity", "", wanted.quantity, "is what --tolerance is of: give both, or neither")
-    if wanted.controls and (not wanted.paths or wanted.tolerance is not None or len(files) > 1):
+    if wanted.controls and (not wanted.compare_paths or wanted.tolerance is not None or len(files) > 1):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(wanted.controls), allowed)
     read_files = [read(path, without) for path in files]
-    for file in read_files if wanted.paths else ():
+    for file in read_files if wanted.compare_paths else ():
         steps_of_path(file.twin)
     tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
     parts = len(files) + (len(files) > 1)
@@ -137,7 +139,7 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: TwinOptions, 
     if names[0] == names[1]:
         names = [str(path) for path in files]
     comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
-    gap = paths_apart(first, second) if wanted.paths and comparison.apart is not None else None
+    gap = paths_apart(first, second) if wanted.compare_paths and comparison.acceleration_agreement is not None else None
     return Twins(tuple(examined), comparison, gap)
 
 
@@ -153,7 +155,7 @@ def _examine_file(file: ModelFile, table: ControlTable | None, wanted: TwinOptio
     explained = {each.build: removals_that_agree(file.twin, each.build) for each in agreements if not each.alike}
     lost = misread_numbers(file) if file.document.kind == "URDF" else []
     report = None
-    if wanted.paths:
+    if wanted.compare_paths:
         what = f"marching {steps_of_path(file.twin):,} steps by every build"
         tell(what, 1 / 3)
         report = compare_paths(file.twin, None, table, lambda share: tell(what, (1 + share) / 3))
@@ -173,7 +175,7 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
     """Lines on joint limits that are exceeded in the test states, on dry friction, and on constraints that are soft in
     MuJoCo, with the difference that the softness makes to accelerations."""
     twin = file.twin
-    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.limited else []
+    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
         yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
@@ -197,7 +199,7 @@ def twin_lines(twins: Twins) -> list[str]:
     for each in twins.examined:
         rows += _file_lines(each)
     rows += _comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else []
-    return rows + ([twins.gap.line()] if twins.gap is not None else [])
+    return rows + ([twins.path_gap.line()] if twins.path_gap is not None else [])
 
 
 def verdict_sentence(each: ExaminedFile) -> str:
@@ -205,7 +207,7 @@ def verdict_sentence(each: ExaminedFile) -> str:
     worst = max(row.acceleration for row in each.agreements)
     if each.misread:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
-    if each.certified:
+    if each.is_certified:
         bound = max(row.bound for row in each.agreements)
         said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
         return f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the most{said}"
@@ -228,23 +230,25 @@ def _file_lines(each: ExaminedFile) -> list[str]:
             f"accelerations {two_digit_text(row.acceleration)}"
             f"{apart if row.gap > CONSTRAINT_GAP else ''}{'' if row.same_motion else off}"
         )
-    for build, elements in each.explained.items():
+    for build, elements in each.explanations.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
         rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
     rows += [f"  {lost.sentence()}" for lost in each.misread]
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
-    if each.file.limited:
-        rows.append(f"  limits not built, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
-    rows += [f"  {note}" for note in (*each.constraints, *each.file.notes)]
+    if each.file.ignored_limits:
+        rows.append(
+            f"  limits not built, states drawn inside the ranges: {len(each.file.ignored_limits)} joints and tendons"
+        )
+    rows += [f"  {note}" for note in (*each.constraint_lines, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
-    return rows + [f"  {line}".rstrip() for line in each.price]
+    return rows + [f"  {line}".rstrip() for line in each.price_lines]
 
 
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
-    if comparison.apart is None:
+    if comparison.acceleration_agreement is None:
         rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
         return rows + [f"  {each.sentence(names)}" for each in comparison.differences]
-    apart, influential = comparison.apart, comparison.influential
+    apart, influential = comparison.acceleration_agreement, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
     rows = [
         f"{head}: accelerations differ by {two_digit_text(apart.acceleration)}, most at {apart.worst}; "
@@ -259,7 +263,7 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  {comparison.rest()}")
-    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
+    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent_differences]
     return rows + [
         f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared
     ]

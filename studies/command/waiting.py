@@ -86,7 +86,7 @@ class Waiting:
     text: str
     system: str = ""
     share: float = 0.0
-    begun: float = field(default_factory=time.monotonic)
+    start_time: float = field(default_factory=time.monotonic)
     compilations: Kernels = field(default_factory=Kernels)
     _march: tuple[Any, float] = (None, 0.0)
 
@@ -100,7 +100,7 @@ class Waiting:
             spent, most = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
             share = spent / most if most > spent else None
             return "compiling kernels, once", share, _time_left_text(most - spent if share else None, spent)
-        worked = time.monotonic() - self.begun - self.compilations.spent()
+        worked = time.monotonic() - self.start_time - self.compilations.spent()
         march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
         if march is None:
             return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
@@ -152,7 +152,7 @@ def _draw(waiting: Waiting, finished: threading.Event) -> None:
     while not finished.wait(BAR_PERIOD):
         waiting.compilations.attach()
         waiting.state()  # which sees when a march begins
-        if time.monotonic() - waiting.begun > BAR_DELAY:
+        if time.monotonic() - waiting.start_time > BAR_DELAY:
             break
     else:
         return

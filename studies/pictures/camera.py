@@ -52,7 +52,7 @@ class Camera:
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
         return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
 
-    def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
         the inverse distance of a point behind the camera is negative."""
         seen = (points - self.eye) @ self.axes.T
@@ -88,7 +88,7 @@ def _shaded_triangles(
     camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
-    corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
+    corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
     colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)

@@ -30,7 +30,7 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
     ]
     thick = ARROW_HALF_WIDTH * height / stage.camera.pixels(height)
     arrows = [
-        arrow(*line, thick, stage.kinds[force.kind].colour)
+        arrow(*line, thick, stage.arrow_styles[force.kind].colour)
         for force, line in zip(motion.arrows, arrow_lines(motion, stage, k), strict=True)
     ]
     seen = [surface for surface in arrows if surface]
@@ -42,24 +42,24 @@ def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.nda
     spans = []
     for force in motion.arrows:
         place, turn = drawn_pose(motion, stage, force.body, k)
-        on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.places[force.body][k])
-        spans.append((place + turn @ on_body, stage.kinds[force.kind].scale * force.vectors[k]))
+        on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.positions[force.body][k])
+        spans.append((place + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[k]))
     return spans
 
 
 def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
     rest are magnified, except for a wheel's spin."""
-    rest = np.array(stage.rest[body])
-    place, turn = rest + stage.magnified * (motion.places[body][k] - rest), motion.turns[body][k]
+    rest = np.array(stage.rest_positions[body])
+    place, turn = rest + stage.magnification * (motion.positions[body][k] - rest), motion.turns[body][k]
     if body in stage.wheels:
         # the smallest rotation that takes the y axis to the axle
         axis = np.cross([0.0, 1.0, 0.0], turn[:, 1])
         sine = float(np.linalg.norm(axis))
         angle = np.arctan2(sine, turn[1, 1])
         lean = Rotation.from_rotvec(axis * (angle / sine if sine > 0 else 0.0))
-        return place, _magnified_turn(lean, stage.magnified) @ lean.as_matrix().T @ turn
-    return place, _magnified_turn(Rotation.from_matrix(turn), stage.magnified)
+        return place, _magnified_turn(lean, stage.magnification) @ lean.as_matrix().T @ turn
+    return place, _magnified_turn(Rotation.from_matrix(turn), stage.magnification)
 
 
 def _magnified_turn(turn: Rotation, times: float) -> np.ndarray:

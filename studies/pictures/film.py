@@ -36,7 +36,7 @@ class FilmedMotion:
 
     engine: str
     times: np.ndarray
-    places: dict[str, np.ndarray]
+    positions: dict[str, np.ndarray]
     turns: dict[str, np.ndarray]
     arrows: tuple[Arrow, ...] = ()
     run: Result | None = None
@@ -74,20 +74,21 @@ class Strut:
 class Stage:
     """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
-    shapes : surfaces of each body in its own axes; rest : its place when nothing moves; magnified : how many times as
-    large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is drawn as it
-    is); kinds : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in space.
+    shapes : surfaces of each body in its own axes; rest_positions : its place when nothing moves; magnification : how
+    many times as large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is
+    drawn as it is); arrow_styles : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in
+    space.
     """
 
     title: str
     caption: str
     shapes: dict[str, list[PaintedSurface]]
-    rest: Mapping[str, ArrayLike]
+    rest_positions: Mapping[str, ArrayLike]
     camera: Camera
-    kinds: dict[str, ArrowStyle]
+    arrow_styles: dict[str, ArrowStyle]
     curve: ForceCurve
     scenery: Callable[[float], list[PaintedSurface]] = lambda time: []
-    magnified: float = 1.0
+    magnification: float = 1.0
     wheels: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
 
@@ -95,7 +96,7 @@ class Stage:
 def largest_differences(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
     """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
     forces (N)."""
-    places = [(place, second.places[name]) for name, place in first.places.items()]
+    places = [(place, second.positions[name]) for name, place in first.positions.items()]
     turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
     largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))

@@ -54,8 +54,8 @@ class Page:
         for left, motion in zip(self._lefts, motions, strict=True):
             style: Any = {"fontsize": 12, "weight": "bold", "color": COLOURS[motion.engine], "va": "bottom"}
             self._figure.text(left / PAGE_WIDTH, 1 - (TITLE_HEIGHT - 5) / PAGE_HEIGHT, LABELS[motion.engine], **style)
-        self._legend()
-        axes = self._curves()
+        self._draw_legend()
+        axes = self._draw_curves()
         self._clock = self._figure.text(
             1 - PAGE_MARGIN / PAGE_WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace"
         )
@@ -86,11 +86,11 @@ class Page:
         """Number of the frame in which the plotted forces are largest."""
         return int(np.abs(np.column_stack(self._forces[0])).sum(axis=1).argmax())
 
-    def _legend(self) -> None:
+    def _draw_legend(self) -> None:
         """Draw the legend: an arrow for each kind of force with the length that its legend force (N) has at the
         camera's target, and the stage's caption."""
         row, left = 1 - (TITLE_HEIGHT + PICTURE_HEIGHT + 20) / PAGE_HEIGHT, float(PAGE_MARGIN)
-        for name, kind in self.stage.kinds.items():
+        for name, kind in self.stage.arrow_styles.items():
             length = kind.scale * kind.legend * self.stage.camera.pixels(PICTURE_HEIGHT)
             arrow = FancyArrow(
                 left,
@@ -112,7 +112,7 @@ class Page:
             left += length + 8 + text.get_window_extent().width + 34
         self._figure.text(1 - PAGE_MARGIN / PAGE_WIDTH, row, self.stage.caption, ha="right", va="center")
 
-    def _curves(self) -> Axes:
+    def _draw_curves(self) -> Axes:
         """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others."""
         axes = self._figure.add_axes((70 / PAGE_WIDTH, 62 / PAGE_HEIGHT, 1 - 82 / PAGE_WIDTH, 128 / PAGE_HEIGHT))
         first, curve = self.motions[0], self.stage.curve

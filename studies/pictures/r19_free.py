@@ -120,7 +120,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     columns = [vehicle.tyres.index(tyre) for tyre in front]
     way = front[0].point[0] + SPEED * road.half * np.arange(len(table))
     tracks = front[0].point[1], front[1].point[1]
-    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnified=MAGNIFICATION)
+    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
     rest = {body.name: body.position for body in vehicle.bodies}
     camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
     caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces of the road on the tyres"

@@ -20,15 +20,16 @@ class PassingRoad:
     """A road that moves past the vehicle at a speed (m/s): heights (m) at ``distances`` (m) along it and lateral
     positions ``tracks`` (m).
 
-    up : the vertical component of the direction up, 1 or -1; magnified : of the heights; half : width (m).
+    up_component : the vertical component of the direction up, 1 or -1; magnification : of the heights; half : width
+    (m).
     """
 
     distances: np.ndarray
     heights: np.ndarray
     tracks: tuple[float, float]
     speed: float
-    up: float = 1.0
-    magnified: float = 1.0
+    up_component: float = 1.0
+    magnification: float = 1.0
     half: float = 2.6
 
     def at(self, time: float) -> list[PaintedSurface]:
@@ -39,12 +40,14 @@ class PassingRoad:
         x, y = np.meshgrid(TILE_LENGTH * stations - self.speed * time, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
         dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
-        if self.up < 0:
+        if self.up_component < 0:
             net, dark = net[:, ::-1], dark[:, ::-1]
-        grass = floor(-0.35 * self.up, GRASS_COLOUR, self.up)
+        grass = floor(-0.35 * self.up_component, GRASS_COLOUR, self.up_component)
         side, starts = self.half - 0.15, 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
         marks = [
-            box(1.6, 0.1, 0.02, LINE_COLOUR).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
+            box(1.6, 0.1, 0.02, LINE_COLOUR).at(
+                x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up_component
+            )
             for x in starts
             for y in (-side, side)
         ]
@@ -54,7 +57,7 @@ class PassingRoad:
         """Height (m) of the drawn road at a position along and across the path."""
         left, two = (np.interp(distance, self.distances, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
-        return self.magnified * (left + share * (two - left))
+        return self.magnification * (left + share * (two - left))
 
 
 def _chosen_tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> PaintedSurface:

@@ -58,7 +58,7 @@ class TruckState(NamedTuple):
     accelerations: np.ndarray
     turning: np.ndarray
     report: np.ndarray
-    sums: np.ndarray
+    weighted_sums: np.ndarray
 
 
 class Stop(NamedTuple):
@@ -250,7 +250,7 @@ def go(now, torques, step, truck, known):
 def in_parts(parts, now, torques, step, truck, known):
     """Advance by a ``Step`` in equal substeps with ``go``. The report is the mean over the substeps; times of locking
     are added."""
-    rows, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
+    rows, sums, part, time = now.report, now.weighted_sums, Step(step.time / parts, step.regular / parts), 0.0
     sums[:] = 0.0
     for k in range(parts):
         for i in range(4):

@@ -68,12 +68,12 @@ class MarchCounts:
     """Counts taken while an engine marched: Python frames, memory, callbacks.
 
     frames : Python functions entered, by the engine's own wrapper or from inside the march
-    memory : bytes that Python and numpy took at most, beyond what the march returned
+    peak_bytes : bytes that Python and numpy took at most, beyond what the march returned
     callbacks : MuJoCo callbacks that were installed
     """
 
     frames: int = 0
-    memory: int = 0
+    peak_bytes: int = 0
     callbacks: int = 0
 
 
@@ -95,7 +95,7 @@ def march(engine: str, model: Model) -> MarchCounts:
 def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march with the least memory among several runs. Memory that the time loop needs occurs in every run, so that
     it is in the least, too."""
-    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.memory)
+    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.peak_bytes)
 
 
 @contextmanager
@@ -131,7 +131,7 @@ def _with_probes(function: Callable[..., Any], counts: MarchCounts) -> Callable[
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        counts.memory += peak - _returned_bytes(result, [*args, *options.values()])
+        counts.peak_bytes += peak - _returned_bytes(result, [*args, *options.values()])
         return result
 
     return call

@@ -49,11 +49,11 @@ class ConstrainedBody:
                 -turning @ quaternion[:3],
             ]
         )
-        accelerations, _ = self.solved(state)
+        accelerations, _ = self.accelerations_and_reaction(state)
         about = self.joint_axes[2] @ turning
         return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [about]])
 
-    def solved(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
         centre."""
         m, turned = self.mechanism, _rotation_matrix(state[TURN])
@@ -75,7 +75,7 @@ class ConstrainedBody:
         out, turned = np.zeros(6), _rotation_matrix(state[TURN])
         for spring in self.mechanism.springs:
             if spring.turns:
-                law = spring.stiffness * (state[ANGLE] - spring.rest)
+                law = spring.stiffness * (state[ANGLE] - spring.free_length)
                 law += spring.damping * (self.joint_axes[2] @ state[TURNING])
                 out[3:] -= law * self.joint_axes[2]
                 continue
@@ -85,7 +85,7 @@ class ConstrainedBody:
             if length > 0.0:
                 along = apart / length
                 speed = along @ (state[VELOCITY] + _vector_product(state[TURNING], arm))
-                force = -(spring.stiffness * (length - spring.rest) + spring.damping * speed) * along
+                force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * along
                 out += np.concatenate([force, _vector_product(arm, force)])
         return out
 
@@ -125,7 +125,7 @@ class ConstrainedBody:
     def marched(self, state: np.ndarray, steps: int, step: float) -> np.ndarray:
         """State after ``steps`` steps of length ``step`` (s)."""
         for _ in range(steps):
-            state = self._stepped(state, step)
+            state = self._after_step(state, step)
         return state
 
     def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
@@ -134,16 +134,16 @@ class ConstrainedBody:
         for k in range(round(duration / step) + 1):
             if k % stride == 0:
                 kept.append(state)
-            state = self._stepped(state, step)
-        return self._told(np.array(kept), step * stride)
+            state = self._after_step(state, step)
+        return self._motion_and_reaction(np.array(kept), step * stride)
 
-    def _stepped(self, state: np.ndarray, step: float) -> np.ndarray:
+    def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
         after = step_on(lambda _, here: self.rates(here), 0.0, state, step)
         after[TURN] /= np.linalg.norm(after[TURN])
         return after
 
-    def _told(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
-        solved = [self.solved(state) for state in states]
+    def _motion_and_reaction(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
+        solved = [self.accelerations_and_reaction(state) for state in states]
         accelerations = np.array([each[0] for each in solved])
         wrenches = np.array([wrench + self.springs(state) for (_, wrench), state in zip(solved, states, strict=True)])
         motion = BodyMotion(

@@ -46,7 +46,8 @@ class Spring:
     """A spring and damper from the ground to the body.
 
     turns : about the joint's axis, or else along the line between both points. ground, body (3,): points at the start
-    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), rest : length (m) or angle (rad) without force.
+    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), free_length : length (m) or angle (rad) without
+    force.
     """
 
     turns: bool
@@ -54,7 +55,7 @@ class Spring:
     body: np.ndarray
     stiffness: float
     damping: float
-    rest: float
+    free_length: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,7 @@ def _joints(m: Mechanism, laws: list[Spring]) -> str:
     }
     if m.kind not in kinds:
         raise Refused(m.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
-    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.rest!r}"' for s in laws)
+    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in laws)
     anchor = m.body.place - m.centre
     return "".join(
         f'<joint name="{kind} {i}" type="{kind}"/>'
@@ -69,7 +69,7 @@ def _joints(m: Mechanism, laws: list[Spring]) -> str:
 
 
 def _tendon_text(i: int, spring: Spring) -> str:
-    law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.rest!r}"'
+    law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.free_length!r}"'
     return f'<spatial name="spring {i}" {law}><site site="foot {i}"/><site site="tip {i}"/></spatial>'
 
 

@@ -37,7 +37,7 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
     below.first[0], below.second[0], below.share[0] = surface.first, surface.second, surface.share
     wheels.start[0], wheels.load[0] = motion.start, load
     ahead = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
-    slide(0, ahead, motion.across, motion.regular, below.lag, tables.angles, wheels)
+    slide(0, ahead, motion.across, motion.least_speed, below.lag, tables.angles, wheels)
     given = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
     compiled_tyre(
         0, given, Wheel(braked.radius, braked.inertia, braked.turning), tables, wheels, below, Report(*report)

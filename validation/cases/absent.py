@@ -164,7 +164,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
             f"absent.memory.{engine}",
             SYSTEM,
             f"{engine}: memory that 1,980 more steps take beyond their result",
-            long.memory - short.memory,
+            long.peak_bytes - short.peak_bytes,
             "B",
         ).at_most(1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
         Observed(

@@ -88,7 +88,7 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
     (spring,) = moved.springs
     travel, rate, law = _sprung(moved, output)
-    told = spring.stiffness * (travel - spring.rest) + spring.damping * rate
+    told = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
     if moved is mechanism and np.abs(told - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
     early = output.times <= READ_OFF_SECONDS

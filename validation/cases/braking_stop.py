@@ -165,9 +165,11 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
         "no number": not all(np.isfinite(part).all() for part in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-        "does not stop": brakes and stopped.rest < 0,
-        "creeps": stopped.rest >= 0
-        and bool(np.abs(speed[stopped.rest :]).max() > 0.0 or np.ptp(path.position[stopped.rest :]) > 0.0),
+        "does not stop": brakes and stopped.step_of_rest < 0,
+        "creeps": stopped.step_of_rest >= 0
+        and bool(
+            np.abs(speed[stopped.step_of_rest :]).max() > 0.0 or np.ptp(path.position[stopped.step_of_rest :]) > 0.0
+        ),
     }
     return [name for name, wrong in broken.items() if wrong]
 
@@ -226,7 +228,7 @@ def _release_row() -> Row:
         braked_stop = braked(
             FRONT_WHEEL, tables, UNIFORM_ROAD, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0
         )
-        errors.append(abs(braked_stop.released - 0.5 * 0.8037))
+        errors.append(abs(braked_stop.release_time - 0.5 * 0.8037))
     return Observed(
         "braking_stop.release",
         SYSTEM,

@@ -52,12 +52,12 @@ class Judged:
     @property
     def saving(self) -> float:
         """Ratio of the calls at equal accuracy of the complete scene to those of the reduced scene."""
-        return self.choice.before.calls / self.choice.after.calls
+        return self.choice.cost_before.calls / self.choice.cost_after.calls
 
     @property
     def honest(self) -> bool:
         """False if the choice claims to keep the tolerance and another route finds that it does not."""
-        changes = self.choice.confirmed if self.by_frequency is None else self.by_frequency
+        changes = self.choice.confirmed_change if self.by_frequency is None else self.by_frequency
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
@@ -67,7 +67,7 @@ def judged(scene: DrawnRide, second: bool) -> Judged:
     chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
     rest = whole.reduced(reduced_without(scene.scene, choice.left_out))
-    two, deviation = Screen(whole.full, chooser.rows).identity(rest)
+    two, deviation = Screen(whole.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return Judged(
         scene,
@@ -104,7 +104,7 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
     share = float(np.mean([each.choice.within_tolerance for each in choices]))
     lies = sum(not each.honest for each in choices)
     second = [each for each in choices if each.by_frequency is not None]
-    gap = max(float(abs(each.by_frequency - each.choice.confirmed).max()) for each in second)
+    gap = max(float(abs(each.by_frequency - each.choice.confirmed_change).max()) for each in second)
     return [
         Observed(
             "choice_linear.kept",
@@ -137,7 +137,7 @@ def _prediction_row(choices: list[Judged]) -> Row:
     """Row: ratios of predicted to confirmed changes, over all choices and quantities whose change is above zero and
     below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
+        np.concatenate([getattr(each.choice, f"{part}_change") for each in choices]) for part in PREDICTED_CONFIRMED
     )
     told = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
     ratios = predicted[told] / confirmed_[told]
@@ -261,7 +261,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
     choice = chooser.choose()
     named = {effect.name: effect for effect in choice.candidates}
     mass, damper = named["mass of all wheels"], named["tyre damping"]
-    alone, both = chooser.confirm(frozenset([mass])), chooser.confirm(frozenset([mass, damper]))
+    alone, both = chooser.confirmed_changes(frozenset([mass])), chooser.confirmed_changes(frozenset([mass, damper]))
     step = chooser.cost(frozenset([mass, damper])).step / chooser.cost(frozenset()).step
     return [
         behaviour_row(
@@ -324,8 +324,8 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
     choice = judged_choice.choice
     return {
         "tolerance": judged_choice.scene.tolerance,
-        "predicted": choice.predicted.tolist(),
-        "confirmed": choice.confirmed.tolist(),
+        "predicted": choice.predicted_change.tolist(),
+        "confirmed": choice.confirmed_change.tolist(),
         "saving": judged_choice.saving,
         "kept": choice.within_tolerance,
         "nearby": judged_choice.nearby,
@@ -333,7 +333,7 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
         "said": list(choice.said),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
-        "rounds": choice.rounds,
+        "rounds": choice.confirmations,
     }
 
 

@@ -82,7 +82,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
-    kept = float(np.mean([each.choice.within_tolerance and each.honest for each in choices]))
+    kept = float(np.mean([each.choice.within_tolerance and each.is_honest for each in choices]))
     return [
         Observed(
             "choice_nonlinear.kept", SYSTEM, f"share of {len(choices)} random scenes whose tolerance is kept", kept, ""
@@ -91,7 +91,7 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
             "choice_nonlinear.honest",
             SYSTEM,
             "choices that are reported as kept although two more runs show that they are not",
-            float(sum(not each.honest for each in choices)),
+            float(sum(not each.is_honest for each in choices)),
             "",
         ).at_most(0.0, "asked: never", "none"),
     ]
@@ -118,7 +118,11 @@ def _refused() -> Row:
 
 def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
-    pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
+    pairs = [
+        (p, c)
+        for each in choices
+        for p, c in zip(each.choice.predicted_change, each.choice.confirmed_change, strict=True)
+    ]
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
 
@@ -175,8 +179,8 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
         "quantities": list(judged_choice.asked.quantities),
         "left out": list(choice.left_out),
         "times": choice.times,
-        "predicted": choice.predicted.tolist(),
-        "confirmed": choice.confirmed.tolist(),
+        "predicted": choice.predicted_change.tolist(),
+        "confirmed": choice.confirmed_change.tolist(),
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "seconds": list(choice.seconds),

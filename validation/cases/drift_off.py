@@ -112,7 +112,7 @@ def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[flo
     scene = force_scene(folder, duration=combination.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), paths)["drift_off"]
     quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
-    return [noise(quiet, combination.size).passes()], times.tolist()
+    return [noise(quiet, combination.size).passing_time()], times.tolist()
 
 
 def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
@@ -128,7 +128,7 @@ def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple
         assembly = assembly_of_scene(
             force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
         )
-        predicted.append(interpolation(assembly).passes())
+        predicted.append(interpolation(assembly).passing_time())
         measured.append(_drift_off(assembly, true))
     return predicted, measured
 
@@ -142,7 +142,7 @@ def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[fl
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
         others.append(p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True)))))
     return (
-        [model_error_curve(assembly, other).passes() for other in others],
+        [model_error_curve(assembly, other).passing_time() for other in others],
         [_drift_off(replace(assembly, parameters=other), true) for other in others],
     )
 
@@ -152,7 +152,7 @@ def _drift_off(assembly: Assembly, true: Result) -> float:
     does.
     """
     run = simulate(assembly.scene, "reference", assembly=assembly)
-    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
+    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passing_time()
     return np.inf if time is None else time
 
 

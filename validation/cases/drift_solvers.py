@@ -114,7 +114,7 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
-    time = GrowthCurve(run.times, error).passes()
+    time = GrowthCurve(run.times, error).passing_time()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
@@ -188,7 +188,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     p, period = assembly.parameters, 1 / NOISY_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
     at = np.rint(np.array(WINDOW) / period).astype(int)
-    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
+    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:

@@ -78,7 +78,7 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     times, assembly = np.arange(1, LENGTH + 1), assembly_of_scene(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
     p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=LENGTH))
-    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
     carried = covariance(quiet, DEVIATION)
     alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
@@ -135,7 +135,7 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str =
         "body error": float(measured["force-body"][1].max()),
         "swing": float(np.mean([slow_swing_frequency(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
-        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
+        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.wheel_inertia / rigid.inertia)),
     }
 
 
@@ -253,7 +253,7 @@ def _twin_row(folder: Path) -> Row:
     true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
-    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / RATE, p)[at], q)))
     deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = (

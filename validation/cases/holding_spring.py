@@ -95,7 +95,7 @@ def _measure(folder: Path) -> FreeRuns:
 def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str = "reference") -> float:
     """Largest pitch error (rad) of a run with a holding spring of a stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
-    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total)
+    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
     return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - free_runs.pitch).max())
 

@@ -247,7 +247,7 @@ def _handed_on(folder: Path) -> list[Row]:
             "measured_long.check_channel",
             SYSTEM,
             "share of a measured spring force's variance that the stabilised run does not explain",
-            1.0 - force.explained,
+            1.0 - force.explained_variance,
             "1",
         ).at_most(0.01, "noise of 8 N on 100 N, and what the filter adds", "native"),
     ]

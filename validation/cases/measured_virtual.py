@@ -240,7 +240,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
         ),
     ]
     level = Level(NOISE["force"], NOISE["moment"])
-    until = predicted_drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted
+    until = predicted_drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted_time
     try:
         run = march(free, folder / "free")
     except RunFailed as error:
@@ -273,7 +273,7 @@ def _trust_times() -> list[Row]:
     for name, frame, duration, level in cases:
         virtual = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
         true = virtual_measurement(vehicle, virtual, "mujoco")
-        predicted = predicted_drift(vehicle, level, 1 / RATE, duration, frame).passes()
+        predicted = predicted_drift(vehicle, level, 1 / RATE, duration, frame).passing_time()
         assert predicted is not None
         drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(

@@ -149,8 +149,8 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
             noise = normal_samples(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
             alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((count, 3)))
-            axis = int(np.argmax(array.gains()))
-            law, variance = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
+            axis = int(np.argmax(array.noise_gains()))
+            law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
             rows.append(
                 mean_square(
@@ -303,7 +303,7 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
             "motion.walk",
             SYSTEM,
             "ratio of the rate error's mean square to its gain after 60 s of integration alone",
-            float(np.mean((errors[:, -1] / array.gains()) ** 2)),
+            float(np.mean((errors[:, -1] / array.noise_gains()) ** 2)),
             "m^2/s^2",
         ),
         NOISE**2 * PERIOD * (count - 1) * PERIOD,
@@ -313,7 +313,7 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     curves = {
         "time": PERIOD * np.arange(count),
         "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
-        "law": NOISE * root_mean_square(array.gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
+        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
     }
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
@@ -329,7 +329,7 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * root_mean_square(array.gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
+    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
@@ -382,7 +382,7 @@ def draw(data: Saved) -> Drawn:
     heights = np.geomspace(0.02, 1.2, 40)
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted_sensors(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
-        left.loglog(heights, [array.gains().max() for array in arrays], label=label)
+        left.loglog(heights, [array.noise_gains().max() for array in arrays], label=label)
     height, _, spatial, _, plane = zip(*(line for line in data["gains"] if len(line) == 5), strict=True)
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)

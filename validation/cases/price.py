@@ -117,7 +117,7 @@ def _in_processes() -> tuple[list[CaseAnswer], CaseAnswer]:
 def _road_rows(saved_rows: Saved) -> list[Row]:
     """Rows: curves that must coincide on the road, and methods that Exudyn names without having them."""
     road = runner.of_saved(saved_rows)
-    groups = [" = ".join(sorted(group)) for group in road.same()]
+    groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
         behaviour_row(
             f"price.road.coincide.{name}",

@@ -123,7 +123,7 @@ def _coverage(fits: list[Uncertainty]) -> float:
         pairs = zip(predicted, problem.channels, strict=True)
         errors = [error_model(row - channel.values, row) for row, channel in pairs]
         fresh = replace(problem, channels=other.fit.problem.channels)
-        shares.append(error_bands(fresh, known, errors).inside())
+        shares.append(error_bands(fresh, known, errors).share_inside())
     return float(np.mean(shares, axis=0).min())
 
 
@@ -140,7 +140,7 @@ def _race(file: Path, folder: Path) -> Identified:
 
 def _race_rows(identified: Identified) -> list[Row]:
     answer, rows = identified.bands, []
-    figures = zip(AIMS.items(), answer.relative(), answer.inside(), answer.width(), strict=True)
+    figures = zip(AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"
         rows += [
@@ -186,9 +186,9 @@ def _not_run(reason: str) -> list[Row]:
 
 
 def _saved(identified: Identified) -> dict[str, Any]:
-    known = identified.known
+    known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
         "standard errors": [None if np.isnan(each) else float(each) for each in known.deviations],
-        "errors": dict(zip(AIMS, identified.bands.relative().tolist(), strict=True)),
+        "errors": dict(zip(AIMS, identified.bands.relative_error().tolist(), strict=True)),
     }

@@ -258,7 +258,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             "ride_covariance.fast.taken",
             SYSTEM,
             "points of the sweep that had to go the direct way",
-            str(sum(quick.direct.values())),
+            str(sum(quick.direct_counts.values())),
             "0",
             "its eigenvectors are well apart",
         ),

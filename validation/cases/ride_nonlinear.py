@@ -122,9 +122,9 @@ def _fixed_point() -> list[Row]:
         Observed(
             "ride_nonlinear.fixed_point",
             SYSTEM,
-            f"relative distance of the gains from the fixed point after {len(first.changes)} "
+            f"relative distance of the gains from the fixed point after {len(first.gain_changes)} "
             f"iterations, each change at most {first.contraction:.2g} of the last",
-            first.distance,
+            first.fixed_point_distance,
             "",
         ).at_most(1e-11, "last change * c / (1 - c), Banach's bound", "none"),
         Observed(

@@ -75,7 +75,7 @@ def measured_step(chooser: Chooser, omitted_effects: EffectSet) -> float:
     """Longest step (s) with which runs keep the tolerance, by the covariance of their sampled states; for quantities
     without weighting."""
     return longest_step(
-        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact(), chooser.tolerance
+        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact_deviations(), chooser.tolerance
     )
 
 
@@ -88,12 +88,14 @@ class JudgedByRuns:
     engine: str
     asked: ChoiceQuestion | BentRide
     choice: ChoiceByRuns
-    again: np.ndarray
+    repeated_changes: np.ndarray
 
     @property
-    def honest(self) -> bool:
+    def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance and the further runs break it."""
-        return not self.choice.within_tolerance or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
+        return not self.choice.within_tolerance or bool(
+            (self.repeated_changes <= self.asked.tolerance * (1 + 1e-9)).all()
+        )
 
 
 def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns:

@@ -32,7 +32,7 @@ class Sampled:
     @property
     def longest(self) -> float:
         """Longest stable step (s)."""
-        return self.march.longest
+        return self.march.longest_stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities at the samples of a run in steps of ``step`` (s)."""

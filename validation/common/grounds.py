@@ -22,11 +22,11 @@ ANY_ASSUMPTION = ""
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke. ``why``: reason why this is allowed, "" if it is not."""
+    """An assumption that a run broke. ``permission``: reason why this is allowed, "" if it is not."""
 
     run: str
-    broken: BrokenAssumption
-    why: str
+    assumption: BrokenAssumption
+    permission: str
 
 
 @dataclass
@@ -34,14 +34,14 @@ class Grounds:
     """Broken assumptions of the runs since the last rows were made, and whether rows rest on them already."""
 
     breaches: list[Breach] = field(default_factory=list)
-    rested: bool = False
+    rows_rest_on_them: bool = False
     part: int = 0
-    closed: bool = False
+    is_closed: bool = False
 
     def note(self, run: Result) -> None:
         """Record the broken assumptions of a result."""
-        if self.rested:
-            self.breaches, self.rested, self.closed = [], False, False
+        if self.rows_rest_on_them:
+            self.breaches, self.rows_rest_on_them, self.is_closed = [], False, False
         self.part = _instruction_index()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED_ASSUMPTIONS.get()
         for broken in broken_of(run):
@@ -50,23 +50,23 @@ class Grounds:
     def rest(self, allowed: bool) -> str:
         """Text on the broken assumptions on which the current row rests: the allowed ones, or those that are not."""
         same_part = self.part == _instruction_index()
-        self.rested, self.closed = True, self.closed or same_part
-        return "" if self.closed and not same_part else self.told(allowed)
+        self.rows_rest_on_them, self.is_closed = True, self.is_closed or same_part
+        return "" if self.is_closed and not same_part else self.told(allowed)
 
     def told(self, allowed: bool) -> str:
         """Text on each broken assumption (allowed or not): number of runs, longest share of time, and why it is
         allowed."""
         by_name: dict[str, list[Breach]] = {}
         for each in self.breaches:
-            if bool(each.why) == allowed:
-                by_name.setdefault(each.broken.name, []).append(each)
+            if bool(each.permission) == allowed:
+                by_name.setdefault(each.assumption.name, []).append(each)
         return "; ".join(_assumption_text(same) for same in by_name.values())
 
 
 def _assumption_text(same: list[Breach]) -> str:
-    worst = max(same, key=lambda each: each.broken.share)
+    worst = max(same, key=lambda each: each.assumption.share)
     runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
-    return f"{worst.broken.fact()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
+    return f"{worst.assumption.fact()} ({runs}{worst.run}){f': {worst.permission}' if worst.permission else ''}"
 
 
 _CURRENT_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
@@ -86,7 +86,7 @@ def measured_rows(measure: Callable[[], Answer]) -> tuple[Answer, str]:
             answer = measure()
     finally:
         _CURRENT_GROUNDS.reset(before)
-    return answer, "" if grounds.rested else grounds.told(allowed=False)
+    return answer, "" if grounds.rows_rest_on_them else grounds.told(allowed=False)
 
 
 def _instruction_index() -> int:

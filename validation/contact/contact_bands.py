@@ -49,14 +49,14 @@ class TheoryErrors:
     group: Array
 
     @property
-    def used(self) -> Array:
+    def used_friction(self) -> Array:
         """Magnitude (n,) of the force divided by mu N."""
         return np.linalg.norm(self.force, axis=1)
 
     @property
     def used_with_moment(self) -> Array:
         """Magnitude (n,) of force and moment together."""
-        return used_with_moment(self.used, self.moment)
+        return used_with_moment(self.used_friction, self.moment)
 
     def of(self, mask: Array) -> "TheoryErrors":
         """The contacts that a mask (n,) selects."""
@@ -116,7 +116,7 @@ def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
     states."""
     moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
-        float(np.mean(constant.error <= band(name, constant.used, constant.spinning))),
+        float(np.mean(constant.error <= band(name, constant.used_friction, constant.spinning))),
         float(np.mean(constant.moment_error <= moment + ROUNDING)),
     )
 
@@ -142,7 +142,7 @@ def main() -> None:
     """Print the rows of ``error_bands.csv``."""
     known = read_contacts() + read_drawn(FITTED_PART) + read_wide(FITTED_PART)
     theories = {name: theory_errors(name, known) for name in (*FASTSIM_BANDS, "simplified")}
-    for quantity, error, used in (("force", "error", "used"), ("moment", "moment_error", "used_with_moment")):
+    for quantity, error, used in (("force", "error", "used_friction"), ("moment", "moment_error", "used_with_moment")):
         for name, theory in theories.items():
             bands = measured_bands(getattr(theory, error), getattr(theory, used), theory)
             for spin, band_of in zip(("without", "with"), bands, strict=True):

@@ -49,7 +49,7 @@ class PlainEllipse:
     flexible: tuple[float, float, float]
 
     @property
-    def c(self) -> float:
+    def mean_semi_axis(self) -> float:
         """Mean semi-axis sqrt(a b) (m)."""
         return math.sqrt(self.a * self.b)
 
@@ -126,7 +126,10 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
 
 def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
     """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
-    three, creep = 1.0 / np.array(ellipse.flexible), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
+    three, creep = (
+        1.0 / np.array(ellipse.flexible),
+        np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.mean_semi_axis]),
+    )
     if kind == "three" or not creep.any():
         return three
     if kind == "one":

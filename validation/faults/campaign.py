@@ -115,7 +115,7 @@ class Campaign:
             (
                 record["fault"],
                 record["place"],
-                self._sizes(record),
+                self._sizes_text(record),
                 ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
             for record in records[1:]
@@ -142,7 +142,7 @@ class Campaign:
             for record in records[1:]
         ]
 
-    def _sizes(self, record: Record) -> str:
+    def _sizes_text(self, record: Record) -> str:
         return ", ".join(
             f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seeing_checks(record)
         )

@@ -47,13 +47,13 @@ def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
     """The choice for the linear scene with the functions that are in place now (faulty or not), its changes
     (quantities,) by frequency responses, and the largest change near the scene."""
     return _linear_choice_with_functions(
-        LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted
+        LinearChooser.__init__, LinearChooser.confirmed_changes, LinearChooser.off, LinearScreen.predicted_variances
     )
 
 
 def _choice_by_runs() -> JudgedByRuns:
     """The choice by runs for the half car, judged by two further runs."""
-    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.shares)
+    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.relative_changes)
 
 
 @cache
@@ -72,7 +72,7 @@ def _choice_with_functions(*functions: Any) -> JudgedByRuns:
 def _variances() -> float:
     """Largest difference of the reported changes from those by sums over frequencies."""
     choice, by_frequency, _ = _by_frequency()
-    return float(np.abs(by_frequency - choice.confirmed).max())
+    return float(np.abs(by_frequency - choice.confirmed_change).max())
 
 
 def _reported_change() -> float:
@@ -86,26 +86,26 @@ def _prediction_difference() -> float:
     wrong."""
     choice, by_frequency, _ = _by_frequency()
     with np.errstate(invalid="ignore", divide="ignore"):
-        octaves = np.abs(np.log2(choice.predicted / by_frequency)).max()
+        octaves = np.abs(np.log2(choice.predicted_change / by_frequency)).max()
     return float(np.nan_to_num(octaves, nan=np.inf))
 
 
 def _unreported_change() -> float:
     """Ratio of the largest change at random speeds and parameters to the largest change that is reported."""
     choice, _, nearby = _by_frequency()
-    return nearby / float(np.abs(choice.off).max())
+    return nearby / float(np.abs(choice.change_with_parameters_off).max())
 
 
 def _reported_difference() -> float:
     """Largest difference of the reported changes of a half car from those by two further runs."""
     by_runs = _choice_by_runs()
-    return float(np.abs(by_runs.again - by_runs.choice.confirmed).max())
+    return float(np.abs(by_runs.repeated_changes - by_runs.choice.confirmed_change).max())
 
 
 def _runs_kept() -> float:
     """Ratio of the largest change by two further runs to the tolerance, if the choice is reported as within it."""
     by_runs = _choice_by_runs()
-    return by_runs.choice.within_tolerance * float(by_runs.again.max()) / _run().tolerance
+    return by_runs.choice.within_tolerance * float(by_runs.repeated_changes.max()) / _run().tolerance
 
 
 CHECKS = {
@@ -157,7 +157,7 @@ FAULTS = (
         "predictions reported as confirmed",
         "choice of linear scenes",
         attribute_patch(
-            f"{LINEAR_MODULES}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen)
+            f"{LINEAR_MODULES}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted_changes(chosen)
         ),
     ),
     CampaignFault(

@@ -102,7 +102,7 @@ def nearly_plane(engine: str, folder: Path) -> float:
     felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
     array = sensor_array(LIFTED_SENSORS)
     computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
-    least = array.gains(planar=True)[1]
+    least = array.noise_gains(planar=True)[1]
     return root_mean_square(computed - true) / (NOISE * least)
 
 

@@ -83,7 +83,7 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     axes[0].set_ylim(0.3 * measured_points.uncertainty[measured_points.quantity], 15 * top)
     for ax, kind in zip(axes, measured_points.costs, strict=True):
         _mark_defaults(ax, measured_points, kind)
-    alike = "; ".join(curve_name(group[0], [group]) for group in measured_points.same())
+    alike = "; ".join(curve_name(group[0], [group]) for group in measured_points.coinciding_curves())
     add_heading(figure, f"What accuracy costs: {measured_points.title}")
     longest = max(map(len, map(curve_name, styles)))
     figure.legend(
@@ -127,7 +127,7 @@ def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], 
     ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     alike = defaultdict(list)
     for p, place in zip(points, places, strict=True):
-        alike[place[1] < measured_points.floor(), kind == "seconds" and p.changed is None].append(place)
+        alike[place[1] < measured_points.judging_floor(), kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
         face = "white" if hollow else style["color"]
@@ -140,7 +140,7 @@ def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], 
 def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     """Shade the errors that are below the accuracy of the reference."""
     known = measured_points.uncertainty[measured_points.quantity]
-    for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.floor(), 0.25)):
+    for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
     told = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
     ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)

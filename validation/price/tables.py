@@ -34,7 +34,7 @@ def _plain_name(curve: str) -> str:
 
 def cheapest_table(measured_points: MeasuredPoints) -> Table:
     """Table of the cheapest setting that keeps each tolerance."""
-    work, groups = measured_points.costs[0], measured_points.same()
+    work, groups = measured_points.costs[0], measured_points.coinciding_curves()
     rivals = [
         engine for engine in runner.COMPARED_ENGINES if any(p.setting.engine == engine for p in measured_points.points)
     ]
@@ -149,7 +149,7 @@ def _text_of_loss(loss: Loss | None) -> str:
 def every_curve(measured_points: MeasuredPoints) -> Table:
     """Table with a row per curve: settings, errors, observed order, and cost extrapolated to an error of 1."""
     groups, orders, work = (
-        measured_points.same(),
+        measured_points.coinciding_curves(),
         measured_points.observed_orders(measured_points.quantity),
         measured_points.costs[0],
     )

@@ -270,7 +270,7 @@ def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
             for each in recommendation.defaults.values()
             if each.refined is not None and not each.extrapolated
         ]
-    held = recommendation.tolerance - recommendation.searched.uncertainty
+    held = recommendation.tolerance - recommendation.search_truth.uncertainty
     able = sorted(
         (each for each in recommendation.tried if each.setting.default and each.error <= held),
         key=lambda each: each.setting.value,

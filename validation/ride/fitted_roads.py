@@ -90,7 +90,7 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
                 f"ride_road.measured.{name.split('.')[0]}",
                 SYSTEM,
                 f"{name}: rms of ln(measured / fitted) spectrum of the mean process",
-                fitted.mean.residual,
+                fitted.mean.log_residual,
                 "",
             ).beside("", why)
         )
@@ -108,7 +108,7 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
             fit.corner_error,
             fit.filter.intensity,
             fit.intensity_error,
-            fit.residual,
+            fit.log_residual,
             fit.corner_is_resolved,
         ]
         for fit in (fitted.mean, fitted.roll)

@@ -71,7 +71,7 @@ def towed_turn(
         turns.append(drive_run("mujoco", car, speed, duration))
     left, right = (np.array([turn.velocity()[-1, 2], *final_headings(turn)]) for turn in turns)
     yaw, *towed = (left - right) / (2.0 * SMALL_STEER)
-    return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.headings)
+    return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.towed_headings)
 
 
 def final_headings(drive: Drive) -> list[float]:

@@ -56,30 +56,32 @@ class Choice:
     """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
     relative changes (quantities,).
 
-    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run;
-    chance : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of
-    both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene.
-    rounds : runs of the whole scene for confirmation; spent : calls of all runs. sample_factor : factor, roughly, by
-    which more samples would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether
-    the search ended before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps
-    and that would be broken without them.
+    predicted_change : by the screen; prediction_remainder : estimate of what the prediction omits; confirmed_change :
+    over the whole run;
+    statistical_error : statistical error of this, where quantities are means of samples; within_tolerance : whether
+    each sum of both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the
+    reduced scene.
+    confirmations : runs of the whole scene for confirmation; calls_of_search : calls of all runs. sample_factor :
+    factor, roughly, by which more samples would let more effects be left out, 0 where statistical errors prevent
+    nothing. ended_early : whether the search ended before all sets were tried. assumptions_barring : for effects that
+    stay, the assumptions that the scene keeps and that would be broken without them.
     """
 
     candidates: tuple[str, ...]
     left_out: tuple[str, ...]
     times: int
-    predicted: np.ndarray
-    remainder: np.ndarray
-    confirmed: np.ndarray
-    chance: np.ndarray
+    predicted_change: np.ndarray
+    prediction_remainder: np.ndarray
+    confirmed_change: np.ndarray
+    statistical_error: np.ndarray
     within_tolerance: bool
     calls: tuple[int, ...]
     seconds: tuple[float, ...]
-    rounds: int
-    spent: int
+    confirmations: int
+    calls_of_search: int
     sample_factor: float
-    ended: bool = False
-    barred: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
+    ended_early: bool = False
+    assumptions_barring: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
 
 
 class Chooser:
@@ -103,8 +105,8 @@ class Chooser:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine, executor), quantities)
         self.alike = self.whole.sampled == set(quantities)
-        part = self._part()
-        self.step_factor, self.error = self._steps(part)
+        part = self._part_screen()
+        self.step_factor, self.error = self._longest_screen_step(part)
         self.teller = self._coarse_screen(self.whole)
         self.screen = self._coarse_screen(part) if self.alike else self.teller
         self.lengths = [self.step_factor * k for k in self.screen.variants.lengths()]
@@ -114,7 +116,7 @@ class Chooser:
         self._pairs: list[EffectSet] | None = None
         self.rounds, self._doubtful, self.ended = 0, list[float](), False
 
-    def _part(self) -> Screen:
+    def _part_screen(self) -> Screen:
         """Screen of the first part of the scene, or of a few of its samples."""
         whole = self.whole.variants
         if not whole.system.WINDOWED:
@@ -128,19 +130,19 @@ class Chooser:
         coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
-    def _steps(self, screen: Screen) -> tuple[int, np.ndarray]:
+    def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
         """Longest steps that are allowed for the screen, as a multiple of the scene's own, and the relative changes
         (quantities,) that they cause.
         """
         whole = self.whole.variants
         lengths = [k for k in whole.lengths() if k in screen.variants.lengths()]
         allowed = (SAMPLED_STEP_SHARE if self.alike else SCREENED_STEP_SHARE) * self.tolerance
-        longest, error = self._longest(screen, frozenset(), lengths, allowed)
+        longest, error = self._longest_allowed(screen, frozenset(), lengths, allowed)
         while whole.of(times=longest) is None:  # its run fails after that part
             longest = max(k for k in lengths if k < longest)
         return longest, error
 
-    def _longest(
+    def _longest_allowed(
         self, screen: Screen, omitted_effects: EffectSet, lengths: list[int], allowed: float
     ) -> tuple[int, np.ndarray]:
         """Longest step of ``lengths`` whose relative changes (quantities,) are allowed, and these changes. It is found
@@ -157,12 +159,16 @@ class Chooser:
         """Ratio of the largest predicted change, with a bound on what the prediction omits, to the tolerance; infinite
         where leaving the effects out breaks an assumption that the scene keeps.
         """
-        if self.barred(omitted_effects):
+        if self.breaks_assumption(omitted_effects):
             return math.inf
-        error = self.error + self.screen.predicted(omitted_effects) + self.screen.remainder(omitted_effects)
+        error = (
+            self.error
+            + self.screen.predicted_change(omitted_effects)
+            + self.screen.higher_order_estimate(omitted_effects)
+        )
         return float(np.max(error)) / self.tolerance
 
-    def barred(self, omitted_effects: EffectSet) -> bool:
+    def breaks_assumption(self, omitted_effects: EffectSet) -> bool:
         """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two effects this
         is predicted from pairs: it does if, for some effect, every pair with another one does.
         """
@@ -178,7 +184,7 @@ class Chooser:
         """Longest step without these effects that the predictions allow, as a multiple of the scene's own."""
         if omitted_effects not in self._reach:
             left = max(0.0, PREDICTION_SHARE - self.share(omitted_effects)) * self.tolerance
-            self._reach[omitted_effects], _ = self._longest(self.screen, omitted_effects, self.lengths, left)
+            self._reach[omitted_effects], _ = self._longest_allowed(self.screen, omitted_effects, self.lengths, left)
         return self._reach[omitted_effects]
 
     def work(self, omitted_effects: EffectSet) -> float:
@@ -194,25 +200,25 @@ class Chooser:
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + STEP_REDUCTION]:
                 self.rounds += 1
                 change = self.whole.between(self.whole.variants.of(omitted_effects, times), self.whole.variants.of())
-                shares, chance = self.whole.shares(change), self.whole.chance(change)
+                shares, chance = self.whole.relative_changes(change), self.whole.statistical_errors(change)
                 if self.whole.variants.newly_broken(omitted_effects, times):
                     shares = np.full_like(shares, np.inf)
                 self._confirmed[omitted_effects] = times, shares, chance
-                if self.holds(shares + chance):
+                if self.within_tolerance(shares + chance):
                     break
                 if (shares < self.tolerance).all():
                     self._doubtful.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
         return np.add(*self._confirmed[omitted_effects][1:])
 
-    def holds(self, changes: np.ndarray) -> bool:
+    def within_tolerance(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
     def is_better(self, further: EffectSet, current: EffectSet) -> bool:
-        """Whether leaving out ``further`` is confirmed, and takes less work than leaving out ``current``, each in its
-        confirmed step.
+        """Whether leaving out ``change_if_left_out_too`` is confirmed, and takes less work than leaving out
+        ``current``, each in its confirmed step.
         """
-        if not self.holds(self.confirm(further)):
+        if not self.within_tolerance(self.confirm(further)):
             return False
         work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, current)]
         return work[0] < work[1]
@@ -220,7 +226,7 @@ class Chooser:
     def choose(self) -> Choice:
         """The greedy choice, confirmed over the whole run."""
         none: EffectSet = frozenset()
-        if not self.holds(self.confirm(none)):
+        if not self.within_tolerance(self.confirm(none)):
             self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
         kept, banned = [none], set[EffectSet]()
         while self.rounds < MOST_CONFIRMATIONS and not self.ended:
@@ -262,10 +268,10 @@ class Chooser:
             tuple(sorted(omitted_effects)),
             times,
             self.told(omitted_effects, times),
-            self.teller.remainder(omitted_effects),
+            self.teller.higher_order_estimate(omitted_effects),
             shares,
             chance,
-            self.holds(shares + chance),
+            self.within_tolerance(shares + chance),
             tuple(calls),
             tuple(count * seconds for count, seconds in zip(calls, each, strict=True)),
             self.rounds,
@@ -280,7 +286,7 @@ class Chooser:
         return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
     def _budget_spent(self) -> bool:
-        """Whether the search has used all the calls that it may make; if so, it sets ``ended``."""
+        """Whether the search has used all the calls that it may make; if so, it sets ``ended_early``."""
         whole_run = self.whole.variants.of()
         share = self._calls_so_far() / (RUN_BUDGET * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
@@ -292,9 +298,9 @@ class Chooser:
         changes comes from a comparison with a shorter step.
         """
         screen, runs = self.teller, self.whole.variants
-        change = screen.change(omitted_effects) if omitted_effects else None
+        change = screen.predicted_difference(omitted_effects) if omitted_effects else None
         if times == 1:
-            return screen.predicted(omitted_effects)
+            return screen.predicted_change(omitted_effects)
         shorter = [
             k for k in reversed(runs.lengths()) if times % k == 0 and (STEP_CHECK_REFINEMENT * k <= times or k == 1)
         ]
@@ -302,10 +308,12 @@ class Chooser:
             runs.of(omitted_effects, times), next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None)
         )
         if change is None or step is None or times % self.step_factor:
-            return screen.predicted(omitted_effects) + screen.shares(step)
-        return screen.shares({name: sum_of_differences(change[name], step[name]) for name in screen.quantities})
+            return screen.predicted_change(omitted_effects) + screen.relative_changes(step)
+        return screen.relative_changes(
+            {name: sum_of_differences(change[name], step[name]) for name in screen.quantities}
+        )
 
-    def further(self, omitted_effects: EffectSet) -> dict[str, float]:
+    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[str, float]:
         """Predicted change for each effect that stayed, if it were left out, too: with a larger tolerance than this, it
         could be.
 
@@ -322,8 +330,8 @@ class Chooser:
         """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow."""
         path = list(start)
         while True:
-            step = self._next(path[-1], banned, [frozenset([effect]) for effect in self.effects])
-            step = step or self._next(path[-1], banned, self._promising_pairs())
+            step = self._best_step(path[-1], banned, [frozenset([effect]) for effect in self.effects])
+            step = step or self._best_step(path[-1], banned, self._promising_pairs())
             if not step:
                 return path
             path.append(path[-1] | step)
@@ -338,10 +346,10 @@ class Chooser:
                 if max(alone[effect] for effect in pair) > PREDICTION_SHARE
             ]
             pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
-            self._pairs = self._within([frozenset(pair) for pair in pairs])
+            self._pairs = self._pairs_within_budget([frozenset(pair) for pair in pairs])
         return self._pairs
 
-    def _within(self, pairs: list[EffectSet]) -> list[EffectSet]:
+    def _pairs_within_budget(self, pairs: list[EffectSet]) -> list[EffectSet]:
         """Pairs of effects that keep to the error budget, as far as the budget of calls lets them be tested."""
         within = list[EffectSet]()
         for i, pair in enumerate(pairs):
@@ -352,7 +360,7 @@ class Chooser:
             within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 
-    def _next(self, omitted_effects: EffectSet, banned: set[EffectSet], steps: list[EffectSet]) -> EffectSet:
+    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], steps: list[EffectSet]) -> EffectSet:
         """The step that saves the most work for what it adds to the predicted error; empty where no step keeps to the
         budget.
         """

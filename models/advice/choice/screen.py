@@ -72,15 +72,15 @@ class Screen:
                 return None  # what is left has no such quantity
             raise
 
-    def shares(self, change: Changes | None) -> np.ndarray:
-        """Relative changes (quantities,); infinite where ``change`` is None."""
-        return self._judged(change)[0]
+    def relative_changes(self, change: Changes | None) -> np.ndarray:
+        """Relative changes (quantities,); infinite where ``predicted_difference`` is None."""
+        return self._changes_with_errors(change)[0]
 
-    def chance(self, change: Changes | None) -> np.ndarray:
+    def statistical_errors(self, change: Changes | None) -> np.ndarray:
         """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
-        return self._judged(change)[1]
+        return self._changes_with_errors(change)[1]
 
-    def _judged(self, change: Changes | None) -> np.ndarray:
+    def _changes_with_errors(self, change: Changes | None) -> np.ndarray:
         """Relative changes and their statistical errors (2, quantities)."""
         if change is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
@@ -92,14 +92,14 @@ class Screen:
         ]
         return np.array(pairs).T
 
-    def alone(self, effect: str) -> Changes | None:
+    def first_order_change(self, effect: str) -> Changes | None:
         """First-order difference d: the change if this effect alone is left out."""
-        return self.change(frozenset([effect]))
+        return self.predicted_difference(frozenset([effect]))
 
     def second(self, first: str, second_effect: str) -> Changes | None:
         """Second-order difference e of a pair: the change without both, less the changes without each alone."""
         sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
-        both, *singles = (self.change(effects) for effects in sets)
+        both, *singles = (self.predicted_difference(effects) for effects in sets)
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:
             return None
@@ -108,34 +108,42 @@ class Screen:
         }
 
     def ahead(self, sets: Iterable[EffectSet]) -> None:
-        """Compute in advance the runs that ``change`` needs for these sets."""
+        """Compute in advance the runs that ``predicted_difference`` needs for these sets."""
         self.variants.ahead((part, 1) for chosen in sets for part in _sets_needed(chosen))
 
-    def change(self, omitted_effects: EffectSet) -> Changes | None:
+    def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
         """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
-                *map(self.alone, omitted_effects),
+                *map(self.first_order_change, omitted_effects),
                 *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
             return self.between(self.variants.of(omitted_effects), self.variants.of())
         return {name: sum_of_differences(*(part[name] for part in parts if part)) for name in self.quantities}
 
-    def predicted(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Predicted relative changes (quantities,) if a set of effects is left out, without the ``remainder``."""
-        return self.shares(self.change(omitted_effects)) if omitted_effects else np.zeros(len(self.quantities))
+    def predicted_change(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Predicted relative changes (quantities,) if a set of effects is left out, without the
+        ``higher_order_estimate``.
+        """
+        return (
+            self.relative_changes(self.predicted_difference(omitted_effects))
+            if omitted_effects
+            else np.zeros(len(self.quantities))
+        )
 
-    def remainder(self, omitted_effects: EffectSet) -> np.ndarray:
+    def higher_order_estimate(self, omitted_effects: EffectSet) -> np.ndarray:
         """Estimate (quantities,) of changes of third and higher order: the second order, reduced by the ratio of the
         second order to the first.
         """
         none = np.zeros(len(self.quantities))
         if len(omitted_effects) <= 2:
             return none
-        first = np.sum([self.shares(self.alone(effect)) for effect in omitted_effects], axis=0)
-        second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0)
+        first = np.sum([self.relative_changes(self.first_order_change(effect)) for effect in omitted_effects], axis=0)
+        second = np.sum(
+            [self.relative_changes(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0
+        )
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
             return none  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
@@ -144,7 +152,9 @@ class Screen:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if times == 1:
             return np.zeros(len(self.quantities))
-        return self.shares(self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects)))
+        return self.relative_changes(
+            self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects))
+        )
 
 
 def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:

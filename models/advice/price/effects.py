@@ -161,7 +161,7 @@ def _price_of_effect(
     unchanged: np.ndarray,
     why: str,
 ) -> EffectPrice:
-    there, says = name in variants.effects, variants.says(name)
+    there, says = name in variants.effects, variants.sentence_on_effect(name)
     if other_answer is None or took is None:
         return EffectPrice(name, there, says, why)
     before, after = (other_answer, base) if there else (base, other_answer)

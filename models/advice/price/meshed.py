@@ -79,16 +79,19 @@ class MeshedScene(ABC):
     @cached_property
     def steps(self) -> dict[str, float]:
         """Steps (s) by the name of the method; each is a whole fraction of ``first``."""
-        steps = dict.fromkeys(self._part(self.step * k) for k in STEP_FACTORS)
+        steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[SettingLadder]:
         """A ladder of cells for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
             steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, STEP_HALVINGS)))
-            return [SettingLadder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
+            return [
+                SettingLadder(engine, "RK4", steps, 4, default=self._longest_fraction(self.step))
+                for engine in self.engines
+            ]
         values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, self.cells}))
-        usual = f"RK4 at {1e3 * self._part(self.step):.3g} ms"
+        usual = f"RK4 at {1e3 * self._longest_fraction(self.step):.3g} ms"
         return [
             SettingLadder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
             for engine in self.engines
@@ -101,7 +104,7 @@ class MeshedScene(ABC):
         """
         if not self.cells:
             return SettingLadder(
-                self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4
+                self.reference_engine, "RK4", tuple(self._longest_fraction(self.longest) / 2**k for k in range(16)), 4
             )
         return SettingLadder(
             self.reference_engine,
@@ -109,7 +112,7 @@ class MeshedScene(ABC):
             tuple(1.0 / (FIRST_CELLS * 2**k) for k in range(REFERENCE_RUNGS)),
             2,
             cells=True,
-            sure=CONFIRMATION_DIVISOR,
+            confirmation_divisor=CONFIRMATION_DIVISOR,
         )
 
     def second(self, reference_setting: Setting) -> Setting | None:
@@ -137,9 +140,9 @@ class MeshedScene(ABC):
         return PricedRun(times, values, {"force calls": asked, "contact cells": asked * cells**2})
 
     def _step_tied_to_cells(self, rung: int) -> float:
-        return self._part(self.longest) / 2 ** (max(0, rung) // 2)
+        return self._longest_fraction(self.longest) / 2 ** (max(0, rung) // 2)
 
-    def _part(self, step: float) -> float:
+    def _longest_fraction(self, step: float) -> float:
         """The longest whole fraction (s) of ``first`` that is at most ``step`` (s)."""
         return self.first / math.ceil(self.first / step * (1 - 1e-9))
 

@@ -91,7 +91,7 @@ class Recommendation:
 
     scene: PricedScene
     tolerance: float
-    searched: ReferenceTruth
+    search_truth: ReferenceTruth
     truth: ReferenceTruth
     winners: Winners
     defaults: dict[str, Default]
@@ -345,7 +345,7 @@ def _finer_truth(
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
     while _is_blurred(known, errors):
         try:
-            tolerance = scene.reference().sure * known.uncertainty
+            tolerance = scene.reference().confirmation_divisor * known.uncertainty
             finer = reference_truth(scene, tolerance, scene.whole, known.rung, second_method=False, executor=executor)
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be

@@ -132,7 +132,7 @@ class MeasuredPoints:
         """Error of a point in the quantity to which the tolerances apply."""
         return p.errors[self.quantity]
 
-    def floor(self, quantity: str = "") -> float:
+    def judging_floor(self, quantity: str = "") -> float:
         """Error of a quantity below which the reference is too uncertain to judge."""
         return UNCERTAINTY_FACTOR * self.uncertainty[quantity or self.quantity]
 
@@ -146,9 +146,9 @@ class MeasuredPoints:
 
     def front(self, kind: str) -> list[Point]:
         """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
-        ``floor``.
+        ``judging_floor``.
         """
-        clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.floor()]
+        clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.judging_floor()]
         return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
 
     def observed_orders(self, quantity: str) -> dict[str, float]:
@@ -156,14 +156,14 @@ class MeasuredPoints:
         orders = {}
         for curve, points in self.curves().items():
             sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
-            orders[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.floor(quantity))
+            orders[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.judging_floor(quantity))
         return orders
 
-    def same(self) -> list[tuple[str, ...]]:
-        """Groups of curves that coincide, judged on the points whose errors are above ``floor``."""
+    def coinciding_curves(self) -> list[tuple[str, ...]]:
+        """Groups of curves that coincide, judged on the points whose errors are above ``judging_floor``."""
         return coinciding_curves(
             {
-                curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.floor()}
+                curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.judging_floor()}
                 for curve, points in self.curves().items()
             }
         )
@@ -182,12 +182,12 @@ class MeasuredPoints:
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> CostsAtTolerance:
         """Cost of the kind ``kind`` at which each curve meets ``target``; curves that do not meet it are left out."""
         reaches = {
-            curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
+            curve: self._cost_at_tolerance(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
         }
         return {curve: least for curve, least in reaches.items() if least is not None}
 
-    def _reach(
+    def _cost_at_tolerance(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
         """Cost at which the points of one curve meet a target, by ``curves.reach``."""
@@ -209,17 +209,17 @@ class MeasuredPoints:
             rounds = min(len(p.seconds) for side in pair for p in side)
             if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
-            sides = [self._resampled(side, target, rounds) for side in pair]
+            sides = [self._bootstrapped_seconds(side, target, rounds) for side in pair]
             factor, low, high = interval(sides[0] / sides[1])
         return Loss(factor, low, high, usual.how)
 
-    def _resampled(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
+    def _bootstrapped_seconds(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
         """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
         bootstrap sample of the rounds that both have.
         """
         kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
         medians = np.array([np.median(seconds[resamples(rounds, BOOTSTRAP_DRAWS)], axis=1) for seconds in kept])
-        cheapest_reaches = [self._reach(side, target, costs) for costs in medians.T]
+        cheapest_reaches = [self._cost_at_tolerance(side, target, costs) for costs in medians.T]
         return np.array([least.cost for least in cheapest_reaches if least is not None])
 
     def points_to_time(self) -> list[Point]:

@@ -56,7 +56,7 @@ class Search:
     tried: list[TriedSetting] = field(default_factory=list)
 
     @property
-    def held(self) -> float:
+    def largest_allowed_error(self) -> float:
         """Largest error that a setting may show: the tolerance less the uncertainty of the truth."""
         return self.tolerance - self.truth.uncertainty
 
@@ -126,7 +126,7 @@ class Search:
 
     def meets(self, attempt: TriedSetting) -> bool:
         """Whether a setting meets the tolerance and keeps the assumptions that the reference keeps."""
-        return attempt.status == "ok" and attempt.error <= self.held
+        return attempt.status == "ok" and attempt.error <= self.largest_allowed_error
 
     def _value_in_another_engine(self, ladder: SettingLadder) -> float:
         """The setting's value that the same method needs in another engine, 0 where none has it."""

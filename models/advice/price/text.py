@@ -21,8 +21,8 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
     """
     scene = recommendation.scene
     first = (
-        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.searched.how} "
-        f"{recommendation.searched.uncertainty:.1e} {scene.unit}"
+        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.search_truth.origin} "
+        f"{recommendation.search_truth.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
@@ -31,11 +31,11 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
     extent = getattr(scene, "extent", f"over {scene.whole:g} s")
     return [
         f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} {extent}",
-        f"  truth: {recommendation.truth.how} {recommendation.truth.uncertainty:.1e} {scene.unit}",
+        f"  truth: {recommendation.truth.origin} {recommendation.truth.uncertainty:.1e} {scene.unit}",
         *([] if recommendation.whole else [first]),
         *([f"  {scene.note}"] if scene.note else []),
         *([doubt] if recommendation.tolerance >= recommendation.truth.size else []),
-        *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken),
+        *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken_assumptions),
         "",
         *(_table(recommendation) if recommendation.winners else _no_setting_lines(recommendation)),
         *_default_lines(recommendation),
@@ -95,7 +95,7 @@ def _default_lines(recommendation: Recommendation) -> list[str]:
     rows = [""]
     for engine, default in recommendation.defaults.items():
         tried = default.as_it_is
-        known = max(tried.error, recommendation.searched.uncertainty)
+        known = max(tried.error, recommendation.search_truth.uncertainty)
         error = f"{'' if known == tried.error else 'below '}{known:.2g} {recommendation.scene.unit}"
         over = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
         as_it_is = f"{error}{over}" if tried.status == "ok" else tried.status
@@ -160,9 +160,9 @@ def as_dict(recommendation: Recommendation) -> dict[str, Any]:
         "unit": scene.unit,
         "tolerance": recommendation.tolerance,
         "duration": scene.whole,
-        "truth": recommendation.truth.how,
+        "truth": recommendation.truth.origin,
         "uncertainty": recommendation.truth.uncertainty,
-        "broken assumptions": [asdict(each) for each in recommendation.truth.broken],
+        "broken assumptions": [asdict(each) for each in recommendation.truth.broken_assumptions],
         "cheapest": [
             {"engine": engine or "all", "by": kind, **_choice_as_json(each)}
             for (engine, kind), each in recommendation.winners.items()

@@ -25,23 +25,24 @@ MOST_ROWS = 4_000_000
 
 @dataclass(frozen=True)
 class ReferenceTruth:
-    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; how : text on its origin;
+    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; origin : text on its
+    origin;
     rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there are none; seconds :
-    of the processor that it took, a guide to how long to wait and no price; broken : assumptions that the reference
-    breaks, as every correct setting does.
+    of the processor that it took, a guide to how long to wait and no price; broken_assumptions : assumptions that the
+    reference breaks, as every correct setting does.
     """
 
     answer: PricedRun
     uncertainty: float
-    how: str
+    origin: str
     rung: int
     kink_period: float = 0.0
     seconds: float = 0.0
-    broken: tuple[BrokenAssumption, ...] = ()
+    broken_assumptions: tuple[BrokenAssumption, ...] = ()
 
     def beside(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
         """Those of the broken assumptions that the reference keeps."""
-        known = {assumption.name for assumption in self.broken}
+        known = {assumption.name for assumption in self.broken_assumptions}
         return [assumption for name, assumption in broken.items() if name not in known]
 
     def error(self, other_answer: PricedRun) -> float:
@@ -112,7 +113,7 @@ def reference_truth(
     both = f"{said} and {_setting_text(other)}"
     if differs > tolerance / AGREEMENT_FACTOR:
         raise RunFailed("reference", f"{both} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged")
-    return replace(alone, uncertainty=max(change, differs), how=f"{both}, which differ by")
+    return replace(alone, uncertainty=max(change, differs), origin=f"{both}, which differ by")
 
 
 def _change_by_halving(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
@@ -135,7 +136,7 @@ class _Rung(NamedTuple):
     answer: PricedRun | None
     failure: str
     seconds: float
-    broken: dict[str, BrokenAssumption]
+    broken_assumptions: dict[str, BrokenAssumption]
 
 
 def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
@@ -167,13 +168,13 @@ def _settled_answer(
             continue
         if before is not None:
             last, change = change, _change_by_halving(scene, before, now)
-            if change <= tolerance / ladder.sure:
+            if change <= tolerance / ladder.confirmation_divisor:
                 return now, i, change, seconds, broken
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now
     if before is None:
         raise RunFailed("reference", failure or "no step is fine enough")
-    least = f"{ladder.sure * change:.2g} {scene.unit}"
+    least = f"{ladder.confirmation_divisor * change:.2g} {scene.unit}"
     allowed = f"is finer than the scene's own reference can be known here: at least {least}"
     raise InputError("--tolerance", "", tolerance, allowed)

@@ -68,7 +68,7 @@ class Candidates:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
-        plain = [self._plain(name) for name in quantities]
+        plain = [self._row_and_weighting(name) for name in quantities]
         self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
@@ -77,7 +77,7 @@ class Candidates:
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
-    def _plain(self, quantity: str) -> tuple[int, str]:
+    def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
         """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
         weighted = {f"{name} {by}": (name, by) for name, by in self.scene.ride.weighting.items()}
         name, by = weighted.get(quantity, (quantity, ""))
@@ -103,7 +103,7 @@ class Candidates:
 
     def screen(self, full_scene: FullScene, omitted_effects: EffectSet) -> Screen | None:
         """Covariance and adjoints of the scene without those of these effects that are singular."""
-        base = frozenset(effect for effect in omitted_effects if effect.singular)
+        base = frozenset(effect for effect in omitted_effects if effect.is_singular)
         needs = {name for effect in base for name in effect.needs}
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
 
@@ -117,7 +117,7 @@ class Candidates:
             return None
 
     @cached_in_object
-    def predicted(self, omitted_effects: EffectSet) -> np.ndarray:
+    def predicted_changes(self, omitted_effects: EffectSet) -> np.ndarray:
         """Predicted changes (quantities,), each the largest over the screened speeds; inf where no system remains."""
         return largest_changes(
             np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
@@ -125,7 +125,7 @@ class Candidates:
 
     @cached_in_object
     def _predicted_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> np.ndarray:
-        return self._change(full_scene, omitted_effects, self._predict)
+        return self._changes_at_speed(full_scene, omitted_effects, self._predict)
 
     def share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change to the tolerance. It is inf once any speed exceeds the tolerance; the
@@ -141,19 +141,23 @@ class Candidates:
         return worst
 
     @cached_in_object
-    def confirm(self, omitted_effects: EffectSet) -> np.ndarray:
+    def confirmed_changes(self, omitted_effects: EffectSet) -> np.ndarray:
         """Changes (quantities,) by the exact solution, each the largest over all listed speeds."""
         return largest_changes(
-            np.array([self._change(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes])
+            np.array(
+                [self._changes_at_speed(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes]
+            )
         )
 
     @cached_in_object
-    def solved(self, omitted_effects: EffectSet) -> np.ndarray:
-        """Changes as ``confirm`` gives them, but computed from eigenmodes of the reduced system wherever these are
-        reliable.
+    def changes_by_modes(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Changes as ``confirmed_changes`` gives them, but computed from eigenmodes of the reduced system wherever
+        these are reliable.
         """
         return largest_changes(
-            np.array([self._change(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes])
+            np.array(
+                [self._changes_at_speed(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes]
+            )
         )
 
     def certified(self, omitted_effects: EffectSet) -> bool:
@@ -167,14 +171,14 @@ class Candidates:
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
-        two, variance = screen.identity(reduced)
+        two, variance = screen.certificate_sides(reduced)
         by_motions = solved_in_motions(reduced, self.rows)
         same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all())
         return same and bool((abs(two / variance - 1.0) <= IDENTITY_ERROR).all())
 
     def _predict(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
-        return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
+        return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced)
 
     def _confirm(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
@@ -185,7 +189,7 @@ class Candidates:
         variances = solved_in_motions(reduced, self.rows)
         return exact_variances(reduced, self.rows) if variances is None else variances
 
-    def _change(
+    def _changes_at_speed(
         self,
         full_scene: FullScene,
         omitted_effects: EffectSet,
@@ -246,9 +250,11 @@ class Candidates:
         """Cost without these effects in the longest step with which reduction and steps together keep the tolerance at
         all screened speeds.
         """
-        return self.at_step(omitted_effects, longest_step(self.marches(omitted_effects), self.exact(), self.tolerance))
+        return self.at_step(
+            omitted_effects, longest_step(self.marches(omitted_effects), self.exact_deviations(), self.tolerance)
+        )
 
-    def exact(self) -> list[np.ndarray]:
+    def exact_deviations(self) -> list[np.ndarray]:
         """Standard deviations (quantities,) of the full scene, for each of the screened speeds."""
         return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 

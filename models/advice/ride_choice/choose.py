@@ -46,23 +46,26 @@ class RideChoice:
     """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
     standard deviations that result.
 
-    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
-    off : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are.
-    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy.
-    rounds : choices that were confirmed. said : reasons why promising effects were not left out.
+    predicted_change and confirmed_change : the worst over the listed speeds, with sign; change_between_speeds : over
+    all speeds of their range;
+    change_with_parameters_off : the same with parameters that are off, where that is worst; within_tolerance : whether
+    all of them are.
+    cost_before, cost_after : cost at equal accuracy; stable_steps : the longest stable steps (s) of both, whatever the
+    accuracy.
+    confirmations : choices that were confirmed. said : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
     left_out: tuple[Effect, ...]
-    predicted: np.ndarray
-    confirmed: np.ndarray
-    between: np.ndarray
-    off: np.ndarray
+    predicted_change: np.ndarray
+    confirmed_change: np.ndarray
+    change_between_speeds: np.ndarray
+    change_with_parameters_off: np.ndarray
     within_tolerance: bool
-    before: Cost
-    after: Cost
-    stable: tuple[float, float]
-    rounds: int
+    cost_before: Cost
+    cost_after: Cost
+    stable_steps: tuple[float, float]
+    confirmations: int
     said: tuple[str, ...]
 
 
@@ -70,7 +73,7 @@ class Chooser(Candidates):
     """Search for candidates that can be left out of a scene."""
 
     @cached_property
-    def refused(self) -> dict[EffectSet, str]:
+    def refusal_reasons(self) -> dict[EffectSet, str]:
         """Sets that kept the tolerance but were refused, with the reasons."""
         return {}
 
@@ -93,14 +96,14 @@ class Chooser(Candidates):
         """
         if not omitted_effects:
             return True
-        if not (self.holds(self.solved(omitted_effects)) and self.holds(self.between(omitted_effects))):
+        if not (self.holds(self.changes_by_modes(omitted_effects)) and self.holds(self.between(omitted_effects))):
             return False
         why = self._cancellation_text(omitted_effects)
         off = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
         if not self.holds(off):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
-            self.refused[omitted_effects] = why
+            self.refusal_reasons[omitted_effects] = why
         return not why and omitted_effects not in self.uncertified_sets
 
     def _cancellation_text(self, omitted_effects: EffectSet) -> str:
@@ -130,12 +133,12 @@ class Chooser(Candidates):
         """The greedy choice, confirmed, without effects whose removal saves nothing at equal accuracy."""
         chosen, rounds = self._certified_choice()
         unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
-        looks = (self.confirm, self.between, self.off)
+        looks = (self.confirmed_changes, self.between, self.off)
         changes, between, off = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
-            self.predicted(chosen),
+            self.predicted_changes(chosen),
             changes,
             between,
             off,
@@ -166,7 +169,9 @@ class Chooser(Candidates):
 
     def _refusal_texts(self, omitted_effects: EffectSet) -> tuple[str, ...]:
         """Reasons why larger sets that kept the tolerance were refused."""
-        larger = {refused - omitted_effects: why for refused, why in self.refused.items() if refused - omitted_effects}
+        larger = {
+            refused - omitted_effects: why for refused, why in self.refusal_reasons.items() if refused - omitted_effects
+        }
         return tuple(
             f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
             for more, why in larger.items()
@@ -217,12 +222,12 @@ class Chooser(Candidates):
             1 + EQUAL_COST_LOG
         )
 
-    def further(self, omitted_effects: EffectSet) -> dict[Effect, float]:
+    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[Effect, float]:
         """Largest confirmed change for each effect that stayed, if it were left out as well, with what it needs: with a
         larger tolerance than this, it could be. Only legal sets and finite changes.
         """
         changes = {
-            effect: float(abs(self.solved(omitted_effects | step)).max())
+            effect: float(abs(self.changes_by_modes(omitted_effects | step)).max())
             for effect, step in zip(self.effects, self.single_effect_sets, strict=True)
             if effect not in omitted_effects and not refusal_reason(omitted_effects | step)
         }
@@ -252,12 +257,14 @@ class Chooser(Candidates):
         now, then = self.cost(omitted_effects), self.cost(further)
         return log(now.work / then.work) if then.calls <= now.calls * (1 + LARGEST_CALL_RISE) else 0.0
 
-    def _steps(self) -> list[EffectSet]:
+    def _smallest_sets(self) -> list[EffectSet]:
         """The smallest sets that can be left out. A set that lets white noise pass is also tried together with the
         tyres' damping, through which this noise enters.
         """
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
-        white = [step for step in self.single_effect_sets if damping and not np.isfinite(self.predicted(step)).all()]
+        white = [
+            step for step in self.single_effect_sets if damping and not np.isfinite(self.predicted_changes(step)).all()
+        ]
         return self.single_effect_sets + [step | damping for step in white]
 
     def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saved: SavingOfStep) -> EffectSet:
@@ -265,7 +272,7 @@ class Chooser(Candidates):
         tolerance.
         """
         best, most, now = frozenset[Effect](), 0.0, self.share(omitted_effects)
-        for step in self._steps():
+        for step in self._smallest_sets():
             further = omitted_effects | step
             if (
                 further == omitted_effects

@@ -52,14 +52,14 @@ class CopySteps:
 
     speed: float
     half: float
-    settling: int
-    counted: int
+    settling_steps: int
+    counted_steps: int
     springs: dict[str, BentSpring]
 
     @property
     def steps(self) -> int:
         """Number of steps of a copy."""
-        return self.settling + self.counted
+        return self.settling_steps + self.counted_steps
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ class CopiesInTime:
         step = 2.0 * pace.half * self.times
         march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
         every = max(1, STEPS_PER_READING // self.times)
-        march.over(roads, pace.settling // self.times, every)
-        count = len(range(0, pace.counted // self.times, every))
+        march.march_over(roads, pace.settling_steps // self.times, every)
+        count = len(range(0, pace.counted_steps // self.times, every))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)

@@ -72,14 +72,14 @@ class March:
         return self.reduced.system.C[plain, : self.reduced.states]
 
     @cached_property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest step (s) at which the vehicle's march is stable."""
         return self.reduced.of_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
         omega, weights, apart = self._frequencies(step)
-        last, half = self._alike(step), np.exp(0.5j * step * omega)
+        last, half = self._count_of_aliases(step), np.exp(0.5j * step * omega)
         alike = np.arange(-last, last + 1)[:, None]
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = np.zeros((len(omega), len(self.rows)))
@@ -147,7 +147,7 @@ class March:
         """Filters of an axle of the road."""
         return Filters(self.reduced.excitation)
 
-    def _alike(self, step: float) -> int:
+    def _count_of_aliases(self, step: float) -> int:
         """Number of aliased waves to either side within which contributions need not fall with the square of the
         distance.
         """
@@ -170,7 +170,7 @@ class RunInSteps(Protocol):
     """Runs in time of a scene at one speed, in steps (s) of any length."""
 
     @property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest step (s) at which the run is stable."""
 
     def deviations(self, step: float) -> np.ndarray:
@@ -197,7 +197,7 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
             worst = max(worst, float(np.log(max(error, NEGLIGIBLE_SHARE))))
         return worst
 
-    high = 0.999 * min(march.longest for march in marches)
+    high = 0.999 * min(march.longest_stable_step for march in marches)
     steps = np.geomspace(SHORTEST_STEP_SHARE * high / 0.999, high, STEPS_TRIED)
     shares, low, broken = dict[int, float](), -1, STEPS_TRIED
     while broken - low > 1:

@@ -33,11 +33,11 @@ ALLOWED_STANDARD_ERRORS = 4.0
 
 @dataclass(frozen=True)
 class Marched:
-    """Comparison of a run with one in shorter steps. ratio (q,) : of standard deviations; error (q,) : standard error
-    of the ratio; calls : per second of motion.
+    """Comparison of a run with one in shorter steps. deviation_ratio (q,) : of standard deviations; error (q,) :
+    standard error of the ratio; calls : per second of motion.
     """
 
-    ratio: np.ndarray
+    deviation_ratio: np.ndarray
     error: np.ndarray
     calls: float
 
@@ -63,7 +63,7 @@ def confirms_step(march: March, step: float) -> bool:
     said = plain.deviations(step) / plain.deviations(step / STEP_REFINEMENT)
     return bool(
         (
-            abs(run.ratio - said)
+            abs(run.deviation_ratio - said)
             <= ALLOWED_STANDARD_ERRORS * run.error + ALLOWED_SHARE * abs(said - 1.0) + CLOSED_FORM_ERROR
         ).all()
     )

@@ -45,7 +45,7 @@ class Modes:
         grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
         return self if off <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
 
-    def moved(self, time: float, B: np.ndarray) -> np.ndarray:
+    def propagated(self, time: float, B: np.ndarray) -> np.ndarray:
         """The product e^(A t) B (n, k) after a time t (s)."""
         return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
 

@@ -107,16 +107,19 @@ class Neighbourhood:
     def _variances(self, scene: ReducedScene, vehicles: Vehicles) -> np.ndarray:
         """Variances (v, q) of a scene at all speeds."""
         groups = _speeds_with_same_matrices(scene.vehicle, self.speeds)
-        return np.concatenate([self._sum(scene, vehicles, speeds).variances for speeds in groups])
+        return np.concatenate([self._frequency_sum(scene, vehicles, speeds).variances for speeds in groups])
 
-    def _sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "FrequencySum":
+    def _frequency_sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "FrequencySum":
         return FrequencySum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
         """Variances of a scene at a few speeds, with their first-order changes by each parameter that is off."""
         variances, slopes = [], []
         for speeds in _speeds_with_same_matrices(scene.vehicle, self.few):
-            total, vehicle = self._sum(scene, self.vehicles, speeds), self.vehicles.of(scene, float(speeds[0]))
+            total, vehicle = (
+                self._frequency_sum(scene, self.vehicles, speeds),
+                self.vehicles.of(scene, float(speeds[0])),
+            )
             sensitivity = Sensitivity(total.response, total.heights(), total.weights, vehicle.N)
             inert = [group != "bodies" or name not in scene.massless for group, name, _ in self.parameters]
             variances.append(total.variances)
@@ -130,10 +133,10 @@ class Neighbourhood:
         whole = self.scene.vehicle
         if not whole.gravity and replace(vehicle, bars=whole.bars, tyres=whole.tyres) == whole:
             there = set(uncertain_parameters(vehicle))
-            return self._made(whole, speed).only(np.array([each in there for each in self.parameters]))
-        return self._made(vehicle, speed)
+            return self._parameter_shifts(whole, speed).only(np.array([each in there for each in self.parameters]))
+        return self._parameter_shifts(vehicle, speed)
 
-    def _made(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
+    def _parameter_shifts(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
         key = vehicle, of_speed(vehicle, speed)
         if key not in self._shifts:
             linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR

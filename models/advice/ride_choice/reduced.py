@@ -29,14 +29,14 @@ from models.vehicles.spatial_linear import free, limited, linearise, massless
 @dataclass(frozen=True)
 class ReducedVehicle:
     """A vehicle without some of its effects. linear : M, D, K in the remaining coordinates (M may be singular); N (n,
-    r) : from these to the full vehicle's; states : of first order; behind (r, n) : from the full coordinates back,
-    keeping momentum.
+    r) : from these to the full vehicle's; states : of first order; residual_flexibility (r, n) : from the full
+    coordinates back, keeping momentum.
     """
 
     linear: LinearVehicle
     N: np.ndarray
     states: VehicleStates
-    behind: np.ndarray
+    residual_flexibility: np.ndarray
 
     @cached_property
     def modes(self) -> Modes | None:
@@ -79,7 +79,7 @@ class Reduced:
     @cached_property
     def noise(self) -> np.ndarray:
         """Covariance (x, x) per second that the noise of all axles adds."""
-        return noise_of(self.system, self.modes.moved if self.modes else None)
+        return noise_of(self.system, self.modes.propagated if self.modes else None)
 
 
 class Numbers:
@@ -236,8 +236,8 @@ class FullScene:
         inert, road = len(states.massless_part), len(states.A)
         q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])
         left = np.zeros((x, 2 * n + m))
-        left[:inert, :n] = left[inert : 2 * inert, n : 2 * n] = states.massless_part @ vehicle.behind
-        left[2 * inert : road, :n], left[road:, 2 * n :] = states.slow @ vehicle.behind, left_f
+        left[:inert, :n] = left[inert : 2 * inert, n : 2 * n] = states.massless_part @ vehicle.residual_flexibility
+        left[2 * inert : road, :n], left[road:, 2 * n :] = states.integrated_part @ vehicle.residual_flexibility, left_f
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
     def road(self, scene: ReducedScene) -> Excitation:

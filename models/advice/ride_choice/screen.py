@@ -86,11 +86,11 @@ class Screen:
             self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 
     @cached_property
-    def solved(self) -> StationarySolution:
+    def extended_solution(self) -> StationarySolution:
         """The solution for ``base`` in extended precision, for the certificate."""
         return solve(self.base.system, self.rows)
 
-    def predicted(self, reduced: Reduced) -> np.ndarray:
+    def predicted_variances(self, reduced: Reduced) -> np.ndarray:
         """Predicted variances (quantities,) of the reduced system; inf where white noise passes to a quantity."""
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
@@ -100,13 +100,13 @@ class Screen:
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
-    def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
+    def certificate_sides(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
         """Two results for the variances (quantities,) that a certificate compares: from the P of ``base`` with the
         reduced L, and from the reduced P.
         """
         system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
         covariance = solve(system, self.rows)
-        P = left @ self.solved.P @ left.T
+        P = left @ self.extended_solution.P @ left.T
         half = system.A.astype(np.longdouble) @ P
         rest = half + half.T + noise_of(system)
         C = system.C[self.rows].astype(np.longdouble)

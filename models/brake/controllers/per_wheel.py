@@ -105,7 +105,7 @@ class PerWheel:
                 out[first] = out[last] = answer
         if speed < self._common.cut_off:
             return self._command_all(sample.supply if self._pressures else APPLY)
-        return self._said(out)
+        return self._commands_of_logics(out)
 
     def _mean_slowing(self, speed: float) -> float:
         """Mean acceleration of the vehicle (m/s^2), smoothed over about ``SLOPE_MEMORY`` seconds."""
@@ -116,9 +116,9 @@ class PerWheel:
         return self._slowing
 
     def _command_all(self, answer: float) -> Command:
-        return self._said([answer] * self._wheels)
+        return self._commands_of_logics([answer] * self._wheels)
 
-    def _said(self, answers: list[float]) -> Command:
+    def _commands_of_logics(self, answers: list[float]) -> Command:
         if self._pressures:
             return Command(pressures=np.array(answers, dtype=float))
         return Command(valves=np.array(answers, dtype=np.int64))
@@ -130,17 +130,17 @@ class SpeedEstimate:
 
     sample : s between two of them; first : slope (m/s^2) until one is learnt, chosen: with 10 a slip bang-bang takes
     10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry road, as it lets
-    them go too early, with 6 neither; steepest : deceleration (m/s^2) that no vehicle exceeds; margin : the slope by
-    the deceleration learnt; apart : s at least between the moments from which it is learnt. Wheels that are held at a
-    slip and never come back teach it nothing.
+    them go too early, with 6 neither; steepest_deceleration : deceleration (m/s^2) that no vehicle exceeds;
+    slope_margin : the slope by the deceleration learnt; least_interval : s at least between the moments from which it
+    is learnt. Wheels that are held at a slip and never come back teach it nothing.
     """
 
     sample: float
     first: float = 6.0
-    steepest: float = 10.0
+    steepest_deceleration: float = 10.0
     gentlest_deceleration: float = 1.0
-    margin: float = 1.2
-    apart: float = 0.15
+    slope_margin: float = 1.2
+    least_interval: float = 0.15
 
     def __post_init__(self) -> None:
         self._speed, self._slope = math.nan, self.first
@@ -152,16 +152,16 @@ class SpeedEstimate:
         fastest = max(wheels)
         if self._speed != self._speed:
             self._speed = self._peak = fastest
-        self._learn(fastest)
+        self._learn_slope(fastest)
         self._speed = max(fastest, self._speed - self._slope * self.sample)
         return self._speed
 
-    def _learn(self, fastest: float) -> None:
+    def _learn_slope(self, fastest: float) -> None:
         """Determine the slope of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
-        if self._rising and fastest < self._fastest and self._since >= self.apart:
-            slope = self.margin * (self._peak - self._fastest) / self._since
-            self._slope = min(max(slope, self.gentlest_deceleration), self.steepest)
+        if self._rising and fastest < self._fastest and self._since >= self.least_interval:
+            slope = self.slope_margin * (self._peak - self._fastest) / self._since
+            self._slope = min(max(slope, self.gentlest_deceleration), self.steepest_deceleration)
             self._peak, self._since = self._fastest, 0.0
         self._rising, self._fastest = fastest > self._fastest, fastest
 

@@ -35,7 +35,7 @@ class TyreContact:
     height: float
     load: float
     side_speed: float
-    sliding: float
+    side_speed_of_contact: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,9 @@ class Suspension:
         a speed of 1 m/s."""
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
-        across = np.array([[sliding.sliding for sliding in self.contacts(motion, straight)] for motion in motions])
+        across = np.array(
+            [[sliding.side_speed_of_contact for sliding in self.contacts(motion, straight)] for motion in motions]
+        )
         mass, _ = self.bodies.inertia(motions[0], self._gravity)
         damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
         return float(np.linalg.eigvals(damping).real.max())

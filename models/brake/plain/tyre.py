@@ -43,14 +43,14 @@ class Friction:
     """A tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
     tables: Tables
-    under: Surface
+    surface: Surface
     angle: float
     load: float
 
     def mixed_values(self, values: np.ndarray) -> np.ndarray:
         """Values on the surface, a mixture of the two tables' values among those of all tables (t, ...)."""
-        share = self.under.share
-        mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
+        share = self.surface.share
+        mixed: np.ndarray = (1.0 - share) * values[self.surface.first] + share * values[self.surface.second]
         return mixed
 
     def ahead(self) -> Force:
@@ -75,14 +75,14 @@ class Friction:
 @dataclass(frozen=True)
 class WheelMotion:
     """Motion of a wheel's centre: speed along the wheel at the start of a step and its mean rate of change (m/s,
-    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``regular`` (m/s) that
-    replaces lower ones."""
+    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``least_speed`` (m/s)
+    that replaces lower ones."""
 
     start: float
     rate: float
     along: float
     across: float
-    regular: float
+    least_speed: float
 
     @property
     def direction(self) -> float:
@@ -97,7 +97,7 @@ class WheelMotion:
     @property
     def angle(self) -> float:
         """Magnitude (rad) of the slip angle."""
-        return math.atan2(abs(self.across), max(self.forward_speed, self.regular))
+        return math.atan2(abs(self.across), max(self.forward_speed, self.least_speed))
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class Force:
     forces: np.ndarray
 
     @property
-    def sliding(self) -> float:
+    def locked_force(self) -> float:
         """Force (N) at slip 1."""
         return float(self.forces[-1])
 
@@ -79,7 +79,7 @@ class WheelProgress:
     time: float
     slip: float
     impulse: float = 0.0
-    area: float = 0.0
+    slip_integral: float = 0.0
     locked: float = 0.0
     has_been_freed: bool = False
 
@@ -92,23 +92,23 @@ def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[floa
     slip = 1.0 - step_data.radius * turning / step_data.speed(0.0)
     at = WheelProgress(0.0, slip)
     if slip > LOCKED_SLIP:
-        stopping = force.sliding * step_data.radius + step_data.mean_torque(0.0)
+        stopping = force.locked_force * step_data.radius + step_data.mean_torque(0.0)
         if stopping * step_data.step <= -step_data.inertia * turning:
-            return turning + stopping * step_data.step / step_data.inertia, force.sliding, slip, 0.0
-        _advance_at_slip(at, -step_data.inertia * turning / stopping, force.sliding, LOCKED_SLIP)
+            return turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
+        _advance_at_slip(at, -step_data.inertia * turning / stopping, force.locked_force, LOCKED_SLIP)
     while at.time < step_data.step:
         if _stays_locked(step_data, at, force):
             _advance_locked(step_data, at, force)
         elif _is_spinning(step_data, at, force):
             turned = _advance_spinning(step_data, at, force)
             if at.time >= step_data.step:
-                return turned, at.impulse / step_data.step, at.area / step_data.step, at.locked
+                return turned, at.impulse / step_data.step, at.slip_integral / step_data.step, at.locked
         else:
             _roll(step_data, at, force)
     return (
         step_data.speed(step_data.step) * (1.0 - at.slip) / step_data.radius,
         at.impulse / step_data.step,
-        at.area / step_data.step,
+        at.slip_integral / step_data.step,
         at.locked,
     )
 
@@ -116,25 +116,26 @@ def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[floa
 def _advance_at_slip(progress: WheelProgress, time: float, force: float, slip: float) -> None:
     """Advance the wheel's progress by a time (s) at a constant force (N) and slip."""
     progress.time, progress.slip = progress.time + time, slip
-    progress.impulse, progress.area = progress.impulse + force * time, progress.area + slip * time
+    progress.impulse, progress.slip_integral = progress.impulse + force * time, progress.slip_integral + slip * time
 
 
 def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
     """Whether the brake holds a locked wheel, by its torque now or by its mean torque over the remaining step."""
     holds = (
-        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius >= force.sliding
+        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius
+        >= force.locked_force
     )
     return progress.slip >= LOCKED_SLIP and not progress.has_been_freed and holds
 
 
 def _advance_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """Advance a locked wheel until the brake torque falls below the torque of the sliding force, or the step ends."""
-    needed, time = force.sliding * step_data.radius, step_data.step - progress.time
+    needed, time = force.locked_force * step_data.radius, step_data.step - progress.time
     if step_data.torques[1] < needed:
         time = (
             (needed - step_data.torque(progress.time)) * step_data.step / (step_data.torques[1] - step_data.torques[0])
         )
-    _advance_at_slip(progress, time, force.sliding, LOCKED_SLIP)
+    _advance_at_slip(progress, time, force.locked_force, LOCKED_SLIP)
     progress.locked, progress.has_been_freed = progress.locked + time, True
 
 
@@ -142,7 +143,7 @@ def _excess_rate(step_data: WheelStep, progress: WheelProgress, force: Force) ->
     """Rate (m/s^2) of rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
         -step_data.radius
-        * (step_data.radius * force.sliding + step_data.mean_torque(progress.time))
+        * (step_data.radius * force.locked_force + step_data.mean_torque(progress.time))
         / step_data.inertia
         - 2.0 * step_data.gain
     )
@@ -161,10 +162,10 @@ def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Forc
         _excess_rate(step_data, progress, force),
     )
     ahead, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
-    slowing = (step_data.radius * force.sliding + step_data.mean_torque(progress.time)) / step_data.inertia
+    slowing = (step_data.radius * force.locked_force + step_data.mean_torque(progress.time)) / step_data.inertia
     if excess < 0.0:
         time = min(time, -ahead / excess)
-    _advance_at_slip(progress, time, -force.sliding, -1.0)
+    _advance_at_slip(progress, time, -force.locked_force, -1.0)
     progress.has_been_freed = False
     return turning - slowing * time
 
@@ -188,7 +189,7 @@ def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     progress.impulse += (
         step_data.inertia * (turning[1] - turning[0]) / step_data.radius + mean / step_data.radius * time
     )
-    progress.area += area
+    progress.slip_integral += area
 
 
 def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:

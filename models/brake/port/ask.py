@@ -82,12 +82,12 @@ def exception_text(error: BaseException) -> str:
 class CheckedController:
     """A controller whose answers are checked before they are used."""
 
-    inner: Controller
+    controller: Controller
     states: frozenset[int] = VALVE_STATES
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for a sample; raises ControllerFailed."""
-        return ask(self.inner, sample, self.states, sample.supply)
+        return ask(self.controller, sample, self.states, sample.supply)
 
 
 def checked_answer(

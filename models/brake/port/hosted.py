@@ -84,17 +84,19 @@ class ProcessController:
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
-        got = self._more(b"", size, end)
+        got = self._receive_more(b"", size, end)
         if got[:4] == TOLD_MARK:
             length = HEAD_LAYOUT.unpack_from(got)[1]
             raise Failed(
-                json.loads(self._more(got, min(HEAD_LAYOUT.size + length, FAILURE_TEXT_BYTES), end)[HEAD_LAYOUT.size :])
+                json.loads(
+                    self._receive_more(got, min(HEAD_LAYOUT.size + length, FAILURE_TEXT_BYTES), end)[HEAD_LAYOUT.size :]
+                )
             )
         if not got.startswith(begins):
             raise EOFError
         return got
 
-    def _more(self, received: bytes, size: int, end: float) -> bytes:
+    def _receive_more(self, received: bytes, size: int, end: float) -> bytes:
         """Receive until ``size`` bytes are there, or until a complete, shorter frame reports a failure."""
         while len(received) < size and not (
             received[:4] == TOLD_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)

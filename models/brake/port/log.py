@@ -28,20 +28,20 @@ def name_of(scene: str) -> str:
 class LoggedController:
     """A controller whose exchanges are written to a log as they happen."""
 
-    inner: Controller
+    controller: Controller
     file: BinaryIO
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for a sample, which are also written to the log."""
         asked = question_frame(sample)  # before a controller can write into what it is given
-        said = self.inner.sample(sample)
+        said = self.controller.sample(sample)
         self.file.write(asked + answer_frame(sample.number, said))
         return said
 
 
 @contextmanager
 def logged_controller(inner: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
-    """The controller ``inner``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
+    """The controller ``controller``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
     with path.open("wb") as file:
         file.write(LOG_TITLE + scene.encode() + b"\n")
         yield LoggedController(inner, file)

@@ -68,19 +68,19 @@ class SensedController:
     """A controller that receives wheel speeds through sensors, and whose pressures are measured; a new one is made for
     every run.
 
-    teeth : counts the wheels' teeth first; None: their speed is known.
+    tooth_counter : counts the wheels' teeth first; None: their speed is known.
     """
 
-    inner: Controller
+    controller: Controller
     wheels: Channels
     pressures: Channels
-    teeth: Counted | None = None
+    tooth_counter: Counted | None = None
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
         zero."""
-        seen = sample.wheels if self.teeth is None else self.teeth(sample)
-        command = self.inner.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
+        seen = sample.wheels if self.tooth_counter is None else self.tooth_counter(sample)
+        command = self.controller.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
         if command.pressures is None:
             return command
         return Command(pressures=np.maximum(self.pressures(sample.number, np.asarray(command.pressures)), 0.0))

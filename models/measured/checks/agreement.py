@@ -56,7 +56,8 @@ class MeasurementFault:
     the point to which moments refer.
 
     error : standard error of the size from random errors alone; for swapped and crossed, the unexplained share after
-    correction. fall : decrease of chi square. exchanged : hubs, each with the one whose channels it has.
+    correction. chi_square_fall : decrease of chi square. exchanged_hubs : hubs, each with the one whose channels it
+    has.
     """
 
     kind: Kind
@@ -64,8 +65,8 @@ class MeasurementFault:
     signals: tuple[Signal, ...]
     size: float
     error: float
-    fall: float
-    exchanged: tuple[tuple[str, str], ...] = ()
+    chi_square_fall: float
+    exchanged_hubs: tuple[tuple[str, str], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -78,8 +79,8 @@ class Agreement:
     """Measured cross spectra of forces and readings, compared with the vehicle's response, at frequencies (f,) in Hz.
 
     between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
-    (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean. noise
-    (k,) : power of the readings' white noise in every line.
+    (f, k, c) : of the vehicle, with every correction so far. independent_averages : independent ones in each mean.
+    noise (k,) : power of the readings' white noise in every line.
     """
 
     frequencies: np.ndarray
@@ -89,7 +90,7 @@ class Agreement:
     between: np.ndarray
     readings: np.ndarray
     response: np.ndarray
-    averages: float
+    independent_averages: float
     noise: np.ndarray
 
     @cached_property
@@ -103,7 +104,7 @@ class Agreement:
         return {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
 
     @cached_property
-    def expected(self) -> np.ndarray:
+    def predicted_powers(self) -> np.ndarray:
         """Powers (f, k) of the readings that the forces predict."""
         return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
@@ -111,7 +112,7 @@ class Agreement:
     def left(self) -> np.ndarray:
         """Powers (f, k) of the residual: the measured readings less the prediction."""
         shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
-        return np.maximum(self.readings - 2 * shared + self.expected, 0.0)
+        return np.maximum(self.readings - 2 * shared + self.predicted_powers, 0.0)
 
     @property
     def unexplained(self) -> np.ndarray:
@@ -134,16 +135,16 @@ class Agreement:
         """Weights of the frequencies: inverse of the smoothed unexplained power, so that a line that no force explains
         counts little."""
         kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
-        known = VEHICLE_ERROR**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
+        known = VEHICLE_ERROR**2 * np.maximum(self.predicted_powers, 1e-3 * self.predicted_powers.mean(axis=0))
         padded = np.pad(self.left + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
-        return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
+        return self.independent_averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
         now, faults = self, list[MeasurementFault]()
         while len(faults) < MOST_FAULTS:
-            worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
+            worst = max(now._explaining_faults(), key=lambda fault: fault.chi_square_fall, default=None)
             if worst is None:
                 break
             faults.append(worst)
@@ -155,11 +156,11 @@ class Agreement:
         the fault of a reading."""
         response = self.response.copy()
         if fault.kind == "swapped":
-            to = dict(fault.exchanged)
+            to = dict(fault.exchanged_hubs)
             order = [self.places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
             return replace(self, response=response[:, :, order])
         if fault.kind == "crossed":
-            return self._crossed(fault.signals)
+            return self._with_channels_exchanged(fault.signals)
         if fault.kind == "lever":
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
             return replace(self, response=response + fault.size * self._height_derivatives(hubs))
@@ -182,8 +183,8 @@ class Agreement:
             for fault in (*self._delay_faults(group, weights), *self._factor_faults(group, weights)):
                 if self._is_worth_correcting(self.without(fault), weights):
                     yield fault
-        yield from self._swapped(weights)
-        yield from self._pairs(weights)
+        yield from self._swapped_hub_faults(weights)
+        yield from self._exchanged_channel_faults(weights)
         yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
@@ -267,7 +268,7 @@ class Agreement:
             rest = self.between - self._expected_times_forces
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
             fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
-            large = fault.fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
+            large = fault.chi_square_fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
             if large and self._is_worth_correcting(self.without(fault), weights):
                 yield fault
 
@@ -284,27 +285,27 @@ class Agreement:
                     out[:, :, force] += sign * self.response[:, :, moment]
         return out
 
-    def _swapped(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _swapped_hub_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Faults in which hubs have exchanged their channels: two hubs, or two pairs of hubs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
         for exchanged in (*((pair,) for pair in pairs), *twice):
-            fault = self._exchange(exchanged)
+            fault = self._exchange_fault(exchanged)
             if fault is not None:
                 other = self.without(fault)
                 fall = before - float((weights * other.left).sum())
                 if fall > CHI_SQUARE_FALL and other.left.sum() < self.left.sum():
-                    yield replace(fault, size=self.rms, error=other.rms, fall=fall)
+                    yield replace(fault, size=self.rms, error=other.rms, chi_square_fall=fall)
 
-    def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _exchanged_channel_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Pairs of channels whose signals may be exchanged with each other."""
         for pair, other in self._channel_exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
                 yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
-    def blind(self) -> list[tuple[Signal, ...]]:
+    def undetectable_exchanges(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments along one axis whose exchange this recording could not reveal."""
         alike = ((pair, other) for pair, other in self._channel_exchanges() if len({s.component for s in pair}) == 1)
         return [
@@ -320,7 +321,7 @@ class Agreement:
             for pair in combinations(side, 2):
                 what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
                 if what == 1 and (at == 1 or axis == 1):
-                    yield pair, self._crossed(pair)
+                    yield pair, self._with_channels_exchanged(pair)
 
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this agreement to the corrected one; 0 if it is not significant, or too small to be
@@ -328,13 +329,13 @@ class Agreement:
         fall = float((weights * (self.left - corrected.left)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
-    def _crossed(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
+    def _with_channels_exchanged(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
         """The agreement with two channels exchanged; both are forces, or both are readings."""
         response = self.response.copy()
         response[self._indices_of(channel_pair)[1]] = self.response[self._indices_of(channel_pair[::-1])[1]]
         return replace(self, response=response)
 
-    def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
+    def _exchange_fault(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
         """The fault that describes exchanged pairs of hubs; None if the hubs have different channels."""
         both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
         signals = tuple(s for s in self.inputs if s.at in dict(both))
@@ -345,7 +346,7 @@ class Agreement:
             "swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both
         )
 
-    def seen(self) -> dict[str, tuple[float, float]]:
+    def detectable_sizes(self) -> dict[str, tuple[float, float]]:
         """By signal name: the smallest delay (s) and the smallest error of the factor that the search would detect in
         that signal alone."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2

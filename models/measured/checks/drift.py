@@ -27,7 +27,7 @@ def check(evidence: Evidence) -> list[Finding]:
     others = dict.fromkeys(s.file for s in evidence.inertial if s.file not in clocks)
     if not others:
         return []
-    windows = _agreement_by_window(evidence) if evidence.searched and len(clocks) == 1 else []
+    windows = _agreement_by_window(evidence) if evidence.agreement_and_faults and len(clocks) == 1 else []
     needed = (
         "was not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
         f"{FEWEST_WINDOWS} stretches of {WINDOW_LENGTH:g} s without a gap."
@@ -41,8 +41,8 @@ def check(evidence: Evidence) -> list[Finding]:
 def _agreement_by_window(evidence: Evidence) -> list[tuple[float, Agreement]]:
     """Middle (s) and ``Agreement`` of parts of the recording, each with the corrections found from the whole
     recording."""
-    assert evidence.searched is not None
-    now, recording = evidence.searched[0], evidence.recording
+    assert evidence.agreement_and_faults is not None
+    now, recording = evidence.agreement_and_faults[0], evidence.recording
     length = round(WINDOW_LENGTH / recording.period)
     firsts = np.linspace(0, recording.count - length, max(min(recording.count // length, MOST_WINDOWS), 1)).astype(int)
     windows, c = [], len(now.inputs)
@@ -59,7 +59,7 @@ def _agreement_by_window(evidence: Evidence) -> list[tuple[float, Agreement]]:
                 between=part.cross[:, c:, :c],
                 readings=np.einsum("fkk->fk", part.cross[:, c:, c:]).real,
                 response=now.response[lines],
-                averages=part.averages,
+                independent_averages=part.independent_averages,
             )
             windows.append(((first + length / 2) * recording.period, local))
     return windows

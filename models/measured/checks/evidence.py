@@ -24,8 +24,8 @@ INERTIAL_QUANTITIES = ("acceleration", "angular rate", "angle")
 
 @dataclass(frozen=True)
 class Evidence:
-    """Data on which the checks work. places : of accelerometers and gyros by name; claimed : stated white noise (SI),
-    by name of signal.
+    """Data on which the checks work. places : of accelerometers and gyros by name; stated_noise : stated white noise
+    (SI), by name of signal.
 
     plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
     """
@@ -33,7 +33,7 @@ class Evidence:
     recording: Recording
     vehicle: CutVehicle | None
     places: Mapping[str, TransducerPlace] = field(default_factory=dict)
-    claimed: Mapping[str, float] = field(default_factory=dict)
+    stated_noise: Mapping[str, float] = field(default_factory=dict)
     plane: Parameters | None = None
 
     @cached_property
@@ -63,7 +63,7 @@ class Evidence:
         return TransducerPlace(body.name, body.position) if body else None
 
     @cached_property
-    def lacking(self) -> str:
+    def missing_data_text(self) -> str:
         """Text on which data are missing for comparing forces with motion; empty if none is."""
         if self.vehicle is None:
             return "a vehicle in space"
@@ -115,7 +115,7 @@ class Evidence:
     def agreement(self) -> Agreement | None:
         """Comparison of recorded forces and motion, after correcting signs and units that means show; None where data
         are lacking."""
-        if self.lacking:
+        if self.missing_data_text:
             return None
         assert self.vehicle is not None and self._spectra is not None
         measured_spectra, c = self._spectra, len(self.forces)
@@ -133,8 +133,8 @@ class Evidence:
             measured_spectra.cross[:, c:, :c],
             np.einsum("fkk->fk", measured_spectra.cross[:, c:, c:]).real,
             response[:, :, numbers] / forces * felt[:, None],
-            measured_spectra.averages,
-            measured_spectra.white * np.square([noise(self.recording, s) for s in self.inertial]),
+            measured_spectra.independent_averages,
+            measured_spectra.white_noise_power * np.square([noise(self.recording, s) for s in self.inertial]),
         )
 
     @property
@@ -143,25 +143,25 @@ class Evidence:
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
-    def searched(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
+    def agreement_and_faults(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
         """The agreement after correction of its faults, and these faults, the worst one first."""
         return self.agreement.search() if self.agreement else None
 
     @property
     def faults(self) -> tuple[MeasurementFault, ...]:
         """Faults found by comparing forces with motion; empty if they cannot be compared."""
-        return self.searched[1] if self.searched else ()
+        return self.agreement_and_faults[1] if self.agreement_and_faults else ()
 
     @cached_property
-    def seen(self) -> dict[str, tuple[float, float]]:
+    def detectable_sizes(self) -> dict[str, tuple[float, float]]:
         """By signal name: smallest detectable delay (s) and error of the factor; empty if nothing could be compared."""
-        return self.searched[0].seen() if self.searched else {}
+        return self.agreement_and_faults[0].detectable_sizes() if self.agreement_and_faults else {}
 
     def hub(self, signal: Signal) -> str:
         """Hub at which a force acts after exchanged hubs are corrected."""
         for fault in self.faults:
-            if fault.kind == "swapped" and signal.at in dict(fault.exchanged):
-                return dict(fault.exchanged)[signal.at]
+            if fault.kind == "swapped" and signal.at in dict(fault.exchanged_hubs):
+                return dict(fault.exchanged_hubs)[signal.at]
             if fault.kind == "crossed" and signal in fault.signals:
                 return next(s.at for s in fault.signals if s != signal)
         return signal.at

@@ -22,11 +22,11 @@ WHEEL_RADIUS_RANGE = 0.2, 0.6
 def factor_findings(evidence: Evidence) -> list[Finding]:
     """Findings on wrong factors. Sizes are shares in %, or the ratio of recorded to true value where sign or unit is
     wrong. A finding is only a doubt where a spike may be the cause."""
-    if evidence.lacking:
+    if evidence.missing_data_text:
         what = "Signs, units and factors were not checked by the motion of the vehicle"
-        return [Finding("factor", "note", "", f"{what}: this needs {evidence.lacking}.")]
+        return [Finding("factor", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
     findings = [_factor_finding(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
-    least = [wrong for _, wrong in evidence.seen.values()]
+    least = [wrong for _, wrong in evidence.detectable_sizes.values()]
     parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in FACTOR_ERRORS)
     text = f"A factor that is wrong {parts} of {len(least)} channels would be seen by the motion."
     return [*findings, Finding("gain", "note", "", text)]
@@ -51,10 +51,10 @@ def shift_findings(evidence: Evidence) -> list[Finding]:
     late."""
     if evidence.agreement is None:
         what = "Shifts in time were not checked by the motion of the vehicle"
-        return [Finding("shift", "note", "", f"{what}: this needs {evidence.lacking}.")]
+        return [Finding("shift", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
     findings = [_shift_finding(fault) for fault in evidence.faults if fault.kind == "late"]
-    blind = [name for name, (late, _) in evidence.seen.items() if not late < UNCHECKED_SHIFT]
-    seen = f"{len(evidence.seen) - len(blind)} of {len(evidence.seen)}"
+    blind = [name for name, (late, _) in evidence.detectable_sizes.items() if not late < UNCHECKED_SHIFT]
+    seen = f"{len(evidence.detectable_sizes) - len(blind)} of {len(evidence.detectable_sizes)}"
     text = f"A shift of {1e3 * UNCHECKED_SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
     text += f"; too little of it comes from {', '.join(blind)}." if blind else "."
     return [*findings, Finding("shift", "note", "", text)]

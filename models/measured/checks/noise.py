@@ -18,7 +18,7 @@ def check(evidence: Evidence) -> list[Finding]:
     for signal in evidence.recording.signals:
         size, stated, unit = (
             noise(evidence.recording, signal),
-            evidence.claimed.get(signal.name),
+            evidence.stated_noise.get(signal.name),
             UNIT_OF_QUANTITY[signal.quantity],
         )
         sizes.setdefault(signal.quantity, []).append(size)

@@ -33,14 +33,14 @@ SIDE_LINES = range(2, 5)
 class Spectra:
     """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
 
-    averages : how many independent ones; segments with a sample that is missing are left out. white : power in every
-    line of white noise of variance 1.
+    independent_averages : how many independent ones; segments with a sample that is missing are left out.
+    white_noise_power : power in every line of white noise of variance 1.
     """
 
     frequencies: np.ndarray
     cross: np.ndarray
-    averages: float
-    white: float
+    independent_averages: float
+    white_noise_power: float
 
 
 def cross_spectra(

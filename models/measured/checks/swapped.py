@@ -16,8 +16,10 @@ unexplained: typically a half of right recordings of 1.5 s (angles and rates alo
 def check(evidence: Evidence) -> list[Finding]:
     """Findings on exchanged hubs or channels. Sizes are the share of the inertial readings, in %, that the forces do
     not explain with the given channel map."""
-    if evidence.searched is None:
-        return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
+    if evidence.agreement_and_faults is None:
+        return [
+            Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.missing_data_text}.")
+        ]
     findings = [_hub_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
     findings += [_channel_pair_finding(fault) for fault in evidence.faults if fault.kind == "crossed"]
     return [*findings, _remaining_disagreement(evidence), _indistinguishable_hubs(evidence)]
@@ -42,8 +44,8 @@ def _channel_pair_finding(fault: MeasurementFault) -> Finding:
 
 def _indistinguishable_hubs(evidence: Evidence) -> Finding:
     """Finding on pairs of hubs whose forces move the vehicle so similarly that an exchange could not be seen."""
-    assert evidence.searched is not None
-    pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
+    assert evidence.agreement_and_faults is not None
+    pairs = [" with ".join(s.name for s in pair) for pair in evidence.agreement_and_faults[0].undetectable_exchanges()]
     if not pairs:
         return Finding(PAIR, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
     text = (
@@ -55,8 +57,8 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
 
 def _remaining_disagreement(evidence: Evidence) -> Finding:
     """Finding on the disagreement of forces and motion that remains after all faults are corrected."""
-    assert evidence.searched is not None
-    left = evidence.searched[0]
+    assert evidence.agreement_and_faults is not None
+    left = evidence.agreement_and_faults[0]
     share = left.unexplained
     low, high = int(share.argmin()), int(share.argmax())
     best, worst = (f"{100 * share[i]:.2g} % ({left.outputs[i].name})" for i in (low, high))

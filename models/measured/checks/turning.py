@@ -57,7 +57,7 @@ def _pair_finding(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     transfer = cross[:, 1, 0] / (1j * omega * cross[:, 0, 0].real)
     weight = squared / np.maximum(1 - squared, 1e-6)
     ratio = float((weight @ transfer).real / weight.sum())
-    late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.averages, ratio)
+    late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.independent_averages, ratio)
     wrong, text = cause_and_sentence(ratio, rate, f"the derivative of {angle.name}")
     if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < IN_PHASE_SHARE:
         text = (

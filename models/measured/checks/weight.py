@@ -180,9 +180,9 @@ def _single_channel_error(
 def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
     """Whether the vehicle's motion shows that a channel's factor is right, although the mean suggests an error of this
     share."""
-    if evidence.searched is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
+    if evidence.agreement_and_faults is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
         return False
-    ratio, error = evidence.searched[0].factor(signal)
+    ratio, error = evidence.agreement_and_faults[0].factor(signal)
     return 4 * error < abs(share) and abs(ratio - 1) < MOTION_SHARE * abs(share)
 
 

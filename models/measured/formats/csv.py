@@ -62,10 +62,10 @@ class CsvFile(OpenFile):
         columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in spans:
-                table, times = numbers_of_rows(self.path, self.layout, self._lines(file, first, count), first)
+                table, times = numbers_of_rows(self.path, self.layout, self._bytes_of_rows(file, first, count), first)
                 yield self.factor * table[:, self.clock] if times is None else times, table[:, columns]
 
-    def _lines(self, file: io.BufferedReader, first: int, count: int) -> bytes:
+    def _bytes_of_rows(self, file: io.BufferedReader, first: int, count: int) -> bytes:
         """Bytes of ``count`` rows from row ``first`` on."""
         low, high = first // ROWS_PER_MARK, min(-(-(first + count) // ROWS_PER_MARK), len(self.rows) - 1)
         file.seek(int(self.rows[low]))
@@ -86,7 +86,7 @@ def open_csv(path: Path) -> CsvFile:
         layout, notes = find_layout(path, top, head, clock, units)
         rows, count, left = find_rows(path, layout)
         findings += notes + more + _findings_on_end(path, layout, remarks, count, left)
-        factor = 1.0 if layout.stamps else _factor_to_seconds(path, head, clock, units[clock])
+        factor = 1.0 if layout.time_stamps else _factor_to_seconds(path, head, clock, units[clock])
         start, notes = start_with_zone(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
         if not columns:

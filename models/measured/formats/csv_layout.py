@@ -89,8 +89,8 @@ class FirstLines:
     """Facts about the format of a file from its first lines.
 
     lines : those that are neither empty nor comments. comment_lines : comments that begin with ``#``. separator : as a
-    line ``sep=`` says. undecodable_lines : numbers of lines that are no UTF-8. unit : of characters. stopped : number
-    of the line that could not be read, 0 for none.
+    line ``sep=`` says. undecodable_lines : numbers of lines that are no UTF-8. unit : of characters. unreadable_line :
+    number of the line that could not be read, 0 for none.
     """
 
     unit: np.dtype
@@ -98,7 +98,7 @@ class FirstLines:
     comment_lines: list[FileLine] = field(default_factory=list)
     separator: str = ""
     undecodable_lines: list[FileLine] = field(default_factory=list)
-    stopped: int = 0
+    unreadable_line: int = 0
 
 
 @dataclass
@@ -151,10 +151,12 @@ def read_first_lines(path: Path) -> FirstLines:
             top.lines.append(line)
     if top.separator and top.separator not in SEPARATORS:
         raise InputError(path, "line 1", top.separator, f"{', '.join(SEPARATORS.values())} can part the columns")
-    if not top.lines and not (top.comment_lines and not top.stopped):
+    if not top.lines and not (top.comment_lines and not top.unreadable_line):
         old = b"\r" in data and b"\n" not in data
         hint = ": lines end as on an old Macintosh, and have to be saved with line ends of today" if old else ""
-        raise InputError(path, f"line {top.stopped or len(top.comment_lines) + 1}", None, NEEDED_HEADER_TEXT + hint)
+        raise InputError(
+            path, f"line {top.unreadable_line or len(top.comment_lines) + 1}", None, NEEDED_HEADER_TEXT + hint
+        )
     return top
 
 
@@ -168,14 +170,14 @@ def _complete_lines(data: bytes, begin: int, codec: str, top: FirstLines) -> Ite
         except UnicodeDecodeError:
             text, foreign = data[begin:end].decode("cp1252", errors="replace"), True
         if "\0" in text:
-            top.stopped = number
+            top.unreadable_line = number
             return
         line = FileLine(number, text.rstrip("\r\n"), begin, end)
         if foreign:
             top.undecodable_lines.append(line)
         yield line
         begin = end
-    top.stopped = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
+    top.unreadable_line = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
 
 
 def find_headings_of(path: Path, top: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
@@ -312,11 +314,12 @@ def find_layout(
 
 def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
     """Sentences on every deviation from the usual form: commas between columns of numbers with decimal points."""
-    stamps = layout.stamps
+    stamps = layout.time_stamps
     if stamps is not None:
-        wraps = "; they go on past midnight" if stamps.form == "hh:mm:ss.fff" else ""
+        wraps = "; they go on past midnight" if stamps.notation == "hh:mm:ss.fff" else ""
         yield (
-            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.form}); seconds are counted from the "
+            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.notation}); seconds are "
+            "counted from the "
             f"first, {stamps.first}{wraps}"
         )
     marks = [

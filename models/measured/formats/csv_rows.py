@@ -40,8 +40,8 @@ class Layout:
 
     separator, decimal : signs. begin : byte where the rows begin. line : number of the line before them. names :
     headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. text_columns :
-    columns that hold no numbers. clock : the column of time; stamps : how it is written, None for numbers. unit : bytes
-    of a character, as numpy reads it.
+    columns that hold no numbers. clock : the column of time; time_stamps : how it is written, None for numbers. unit :
+    bytes of a character, as numpy reads it.
     """
 
     separator: str
@@ -52,13 +52,13 @@ class Layout:
     width: int
     text_columns: tuple[int, ...]
     clock: int
-    stamps: Stamps | None
+    time_stamps: Stamps | None
     unit: np.dtype
 
     @property
     def start(self) -> datetime | None:
         """Date and time at time 0; None where the rows do not give it."""
-        return self.stamps.start if self.stamps else None
+        return self.time_stamps.start if self.time_stamps else None
 
     @property
     def numbers(self) -> list[int]:
@@ -114,12 +114,12 @@ def numbers_of_rows(path: Path, layout: Layout, data: bytes, first: int) -> tupl
     text = _without_quotes(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
     times = None
-    if layout.stamps is not None:
+    if layout.time_stamps is not None:
         stamps = [
             cell.replace(_QUOTED_SEPARATOR, layout.separator)
             for cell in _read_columns(layout, text, [layout.clock], str)[:, 0]
         ]
-        times = layout.stamps.seconds(path, stamps, line, layout.names[layout.clock])
+        times = layout.time_stamps.seconds(path, stamps, line, layout.names[layout.clock])
     table, used = _table(path, layout, text, line), len(layout.numbers)
     beyond = np.isfinite(table[:, used:]).any(axis=1)
     if beyond.any():
@@ -205,7 +205,9 @@ def _first_wrong_cell(path: Path, layout: Layout, text: bytes, line_number: int)
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)
         time = (
-            cells[layout.clock].replace(_QUOTED_SEPARATOR, ",") if layout.stamps and layout.clock < len(cells) else ""
+            cells[layout.clock].replace(_QUOTED_SEPARATOR, ",")
+            if layout.time_stamps and layout.clock < len(cells)
+            else ""
         )
         if not time.isprintable():
             place = f"line {line_number + i}, column {layout.names[layout.clock]!r}"

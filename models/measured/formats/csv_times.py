@@ -25,11 +25,11 @@ DAY_IN_NANOSECONDS = 86_400_000_000_000
 
 @dataclass(frozen=True)
 class Stamps:
-    """Times of the clock, all in one notation; ``zero`` is the first time, in ns since 1970 or since midnight."""
+    """Times of the clock, all in one notation; ``first_time`` is the first time, in ns since 1970 or since midnight."""
 
-    form: str
+    notation: str
     zone: str
-    zero: int
+    first_time: int
     first: str
 
     @property
@@ -37,7 +37,7 @@ class Stamps:
         """Date and time at time 0; None where the file names no time zone."""
         if not self.zone:
             return None
-        text = str(np.datetime64(self.zero, "ns").astype("datetime64[us]"))
+        text = str(np.datetime64(self.first_time, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
     def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
@@ -48,18 +48,18 @@ class Stamps:
         try:
             stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
-            raise self._culprit(path, cells, line_number, name) from None
-        passed = stamps - self.zero
-        return np.asarray((passed % DAY_IN_NANOSECONDS if self.form == "hh:mm:ss.fff" else passed) / 1e9)
+            raise self._first_wrong_cell(path, cells, line_number, name) from None
+        passed = stamps - self.first_time
+        return np.asarray((passed % DAY_IN_NANOSECONDS if self.notation == "hh:mm:ss.fff" else passed) / 1e9)
 
     def _cell_for_numpy(self, cell: str) -> str:
         """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
-        matched = TIME_NOTATIONS[self.form].fullmatch(cell.strip())
+        matched = TIME_NOTATIONS[self.notation].fullmatch(cell.strip())
         if matched is None or (matched.groupdict().get("zone") or "") != self.zone:
             raise ValueError(cell)
         return _iso_text(matched)
 
-    def _culprit(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
+    def _first_wrong_cell(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
         """Error at the first cell that is no time in this notation."""
         for i, cell in enumerate(cells):
             try:
@@ -70,7 +70,7 @@ class Stamps:
                     path,
                     f"line {line_number + i}, column {name!r}",
                     cell.strip(),
-                    f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)",
+                    f"a time such as {self.first} is needed ({self.notation}{where}, as in the first row)",
                 )
         return InputError(path, f"line {line_number} and after, column {name!r}", None, "times of the clock are needed")
 
@@ -86,7 +86,7 @@ def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
             try:
                 zero = int(np.datetime64(_iso_text(matched), "ns").astype(np.int64))
             except ValueError:
-                raise plain._culprit(path, [cell], line_number, name) from None
+                raise plain._first_wrong_cell(path, [cell], line_number, name) from None
             return Stamps(form, plain.zone, zero, cell)
     raise InputError(
         path,

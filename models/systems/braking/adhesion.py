@@ -66,7 +66,7 @@ class Utilised:
     """
 
     z: float
-    k: Adhesion
+    adhesion: Adhesion
     k_vehicle: float
 
     @property
@@ -187,7 +187,7 @@ class Split:
     k_high: float
 
     @property
-    def asked(self) -> float:
+    def required_braking_rate(self) -> float:
         """Smallest braking rate z that the regulation requires."""
         return split_rate(self.k_low, self.k_high)
 
@@ -226,13 +226,18 @@ def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, fl
         return {}
     if procedure.kind == "split":
         both = split_adhesion(scene, name)
-        return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
+        return {
+            "z_MALS": both.z,
+            "z_MALS asked for": both.required_braking_rate,
+            "k low": both.k_low,
+            "k high": both.k_high,
+        }
     used = utilisation(scene, scene.road.stretches[0].left)
     return {
         "z_AL": used.z,
-        "k front": used.k.front,
-        "k rear": used.k.rear,
+        "k front": used.adhesion.front,
+        "k rear": used.adhesion.rear,
         "k of all": used.k_vehicle,
         "adhesion utilisation epsilon": used.epsilon,
-        **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False)),
+        **dict(zip(("k trailer front", "k trailer rear"), used.adhesion.trailer, strict=False)),
     }

@@ -70,7 +70,7 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "name the effect load_transfer",
             partial(_transferred_load, scene),
             "of the load at rest",
-            most=LARGEST_LOAD_TRANSFER,
+            upper_limit=LARGEST_LOAD_TRANSFER,
         )
     else:
         yield Assumption(
@@ -79,7 +79,7 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "use a vehicle on its suspension, vehicle.file",
             lambda run: _of_wheels(_loads(run)),
             "N",
-            least=LEAST_WHEEL_LOAD,
+            lower_limit=LEAST_WHEEL_LOAD,
         )
 
 
@@ -144,7 +144,7 @@ def _of_bodies(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumpti
             "balance brakes.trailer with those of the truck",
             partial(_share_lifted_by_hook, scene),
             "of an axle's load",
-            most=LIFTED_LOAD_SHARE,
+            upper_limit=LIFTED_LOAD_SHARE,
         )
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         yield Assumption(
@@ -217,7 +217,7 @@ def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
         "give tyres.files with tables up to larger loads",
         lambda run: _of_wheels(_loads(run)),
         "N",
-        most=float(largest),
+        upper_limit=float(largest),
     )
     widest = min(float(table.angles[-1]) for table in tables)
     if widest < FULL_CIRCLE:
@@ -227,7 +227,7 @@ def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
             "give tyres.files with tables up to larger slip angles",
             lambda run: _of_wheels(_while_moving(run, np.abs(run["slip_angle"]))),
             "rad",
-            most=widest,
+            upper_limit=widest,
         )
     if scene.relaxation is not None or vehicle.sprung is not None:
         yield Assumption(
@@ -236,7 +236,7 @@ def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
             "raise run.substeps",
             partial(_resolved_speed, vehicle),
             "m/s of least speed",
-            most=SLOWEST_SLIP_SPEED,
+            upper_limit=SLOWEST_SLIP_SPEED,
         )
 
 
@@ -260,7 +260,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "name the effect pressure_dynamics, [pressure]",
             lambda run: _of_wheels(_with_start_row(np.diff(run["pressure"], axis=0) / scene.run.sample)),
             "bar/s",
-            most=FASTEST_PRESSURE_RATE,
+            upper_limit=FASTEST_PRESSURE_RATE,
         )
     if port is not None:
         yield Assumption(
@@ -269,7 +269,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "raise brakes.supply, or lower gain, offset and noise of port.pressures",
             lambda run: _of_wheels(run["pressure"]),
             "bar",
-            most=scene.brakes.supply * (1.0 + 1e-9),
+            upper_limit=scene.brakes.supply * (1.0 + 1e-9),
         )
     if port is not None and port.signals.range is not None:
         yield Assumption(
@@ -278,7 +278,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "raise port.signals.range",
             lambda run: _of_wheels(np.abs(run["turning"]) * vehicle.plane.radius),
             "m/s",
-            most=port.signals.range,
+            upper_limit=port.signals.range,
         )
     measured = measured_of(scene, procedure, vehicle.plane.wheels)
     if measured is not None:
@@ -288,7 +288,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
             "measure longer, or end before by run.duration",
             lambda run: {"time": run.times},
             "s",
-            most=float(measured.times[-1]) + scene.run.sample,
+            upper_limit=float(measured.times[-1]) + scene.run.sample,
         )
     yield Assumption(
         "cool brakes",
@@ -296,7 +296,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> I
         "brake from less speed, or spread the torque: no effect knows fading",
         _brake_work,
         "J",
-        most=FADING_WORK,
+        upper_limit=FADING_WORK,
     )
 
 
@@ -324,7 +324,7 @@ def _of_drive(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
         "brake from less speed: no effect adds the air's drag",
         partial(_drag_work_share, scene, float(vehicle.plane.masses.sum())),
         "of the kinetic energy",
-        most=NEGLECTED_ENERGY_SHARE,
+        upper_limit=NEGLECTED_ENERGY_SHARE,
     )
     yield Assumption(
         "stop",
@@ -332,7 +332,7 @@ def _of_drive(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumptio
         "raise run.duration",
         lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else Stop(run.detail).speed[-1:]},
         "m/s",
-        most=0.0,
+        upper_limit=0.0,
     )
 
 

@@ -55,13 +55,13 @@ switching otherwise; among them 11 of the 12 whose true pressures, in 25 times a
 
 
 class OtherRuns(NamedTuple):
-    """Functions that repeat a stop. rerun : the stop with a number of steps per sample, up to a time (s); raises
-    InputError or RunFailed. answered : the controller's commands to speeds of turning (n - 1, W) in rad/s and speeds of
-    the vehicle (n - 1,) in m/s at the samples of a run.
+    """Functions that repeat a stop. repeat_stop : the stop with a number of steps per sample, up to a time (s); raises
+    InputError or RunFailed. commands_for_speeds : the controller's commands to speeds of turning (n - 1, W) in rad/s
+    and speeds of the vehicle (n - 1,) in m/s at the samples of a run.
     """
 
-    rerun: Callable[[int, float], BrakingPath]
-    answered: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
+    repeat_stop: Callable[[int, float], BrakingPath]
+    commands_for_speeds: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
 
 
 Channels = dict[str, np.ndarray]
@@ -79,7 +79,7 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
     if not can_be_repeated(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE_STEP_NOTE if can_be_repeated(scene) else ASKED_ONCE)
     try:
-        paths = _finer_runs(path, steps, repeats.rerun)
+        paths = _finer_runs(path, steps, repeats.repeat_stop)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
@@ -135,7 +135,7 @@ def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherR
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _columns_at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
-    said, beside = (repeats.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
+    said, beside = (repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster)))
     if said.dtype.kind == "i":
         return not np.array_equal(said, beside)
     return _rms(said - beside) > EQUAL_PRESSURE_SHARE * size_of(said)

@@ -181,7 +181,7 @@ class Circle:
         across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
-    def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
+    def solve_steady_circle(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
         """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
         from scipy.optimize import root
 
@@ -206,7 +206,7 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
     unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
     unknown[2:] = (last[1:] - last[0]) / radius
     for slower in speed * CONTINUATION_SHARES:
-        unknown, steady = Circle(vehicle, slower, radius).settled(unknown)
+        unknown, steady = Circle(vehicle, slower, radius).solve_steady_circle(unknown)
         if not steady or np.abs(unknown).max() > LARGEST_TURN_ANGLE:
             return None
     circle, state = Circle(vehicle, speed, radius), Circle(vehicle, speed, radius).state(unknown)
@@ -215,7 +215,7 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
         guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
         guess[vehicle.sprung.turns - 1] = np.diff(state[0, 2:])
         circle = Circle(vehicle, speed, radius, sprung=True)
-        unknown, steady = circle.settled(guess)
+        unknown, steady = circle.solve_steady_circle(guess)
     return circle.turn(unknown) if steady else None
 
 

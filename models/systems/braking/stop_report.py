@@ -164,7 +164,7 @@ class Stop:
         locks = self.locks()
         return wheels | {
             "locked above 15 km/h [s]": locks.time,
-            "longest lock [s]": locks.longest,
+            "longest lock [s]": locks.longest_lock,
             "mean pressure [bar]": lengths @ pressures / whole,
             "final pressure [bar]": path.pressures[-1],
         }

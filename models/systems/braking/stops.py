@@ -110,7 +110,7 @@ class Welch:
     half_width: float
     t: float
     freedoms: float
-    p: float
+    p_value: float
 
 
 def welch_test(first: Scatter, second: Scatter) -> Welch:

@@ -59,7 +59,7 @@ def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
         "lower the load, or compute with finite elements",
         watched,
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
@@ -92,7 +92,7 @@ def _elastic_assumption(watched: Callable[[Result], Watched]) -> Assumption:
         "lower the load or take larger radii: a real contact would be larger and its pressure lower",
         watched,
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -118,7 +118,7 @@ def _small_creepage(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> As
         "lower the creepage: a wheel that slides is no rolling contact",
         lambda run: {name: np.abs(values) for name, values in watched(run).items()},
         "",
-        most=SMALL_CREEPAGE,
+        upper_limit=SMALL_CREEPAGE,
     )
 
 
@@ -129,7 +129,7 @@ def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) ->
         "name the effect falling_friction, which FASTSIM computes",
         lambda run: {name: np.abs(values) for name, values in watched(run).items()},
         "",
-        most=CONSTANT_FRICTION,
+        upper_limit=CONSTANT_FRICTION,
     )
 
 
@@ -140,7 +140,7 @@ def _no_slip_assumption(watched: Callable[[Result], Watched]) -> Assumption:
         'name the effect saturation: method.name = "fastsim"',
         watched,
         "mu N",
-        most=NO_SLIP,
+        upper_limit=NO_SLIP,
     )
 
 
@@ -169,7 +169,7 @@ def _bodies_alike(body: RollingContact) -> Assumption:
         "give both bodies the same material",
         lambda run: {"bodies": cost},
         "mu N",
-        most=DISSIMILARITY_COST,
+        upper_limit=DISSIMILARITY_COST,
     )
 
 
@@ -189,7 +189,7 @@ def _on_profiles(body: OnPatches) -> list[Assumption]:
             "use longer profiles, a smaller load or lateral_shift",
             lambda run: inside,
             "mm from the end",
-            least=0.0,
+            lower_limit=0.0,
         ),
         Assumption(
             "patches apart",
@@ -197,6 +197,6 @@ def _on_profiles(body: OnPatches) -> list[Assumption]:
             'use system = "wheel-rail", which joins patches that have grown together',
             lambda run: {"neighbours": np.array(gaps) / METRES["mm"]},
             "mm",
-            least=0.0,
+            lower_limit=0.0,
         ),
     ]

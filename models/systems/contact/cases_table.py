@@ -124,7 +124,7 @@ def _answers_or_refusals(
     block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int
 ) -> tuple[Array, dict[int, str]]:
     """Answers (rows, columns), NaN in refused rows, and the reason for each refusal by the number of its row."""
-    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.wrong)
+    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.faulty_rows)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
     answers[good], refused = _answers_of_rows(
         {name: column[good] for name, column in block.values.items()}, solve, columns

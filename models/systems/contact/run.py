@@ -212,7 +212,7 @@ def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress
         return answer_table(file, answers, built, scene.method, count, errors=error)
     store = Store(answers.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
-    with store.claimed(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
+    with store.reserved_folder(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
         return answer_table(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
 
 

@@ -36,7 +36,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "drive more slowly or steer less: no tyre here levels off",
             lambda run: _watched_by_tyre(run["load"] / _static_loads(handling), handling),
             "of the load at rest",
-            most=LARGEST_LOAD_RATIO,
+            upper_limit=LARGEST_LOAD_RATIO,
         ),
         Assumption(
             "small lean",
@@ -53,7 +53,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             'brake less, or use system = "braking", whose tyre tables know locked wheels',
             lambda run: {"all tyres": _sliding_share(run, handling)},
             "of the weight",
-            most=SLIDING_WEIGHT_SHARE,
+            upper_limit=SLIDING_WEIGHT_SHARE,
         ),
         Assumption(
             "moving tyres",
@@ -61,7 +61,7 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "end the manoeuvre before the car stops: shorten its duration",
             lambda run: _watched_by_tyre(_contact_speed(run), handling),
             "m/s",
-            least=FADING_SPEED,
+            lower_limit=FADING_SPEED,
         ),
         Assumption(
             "slow steering",

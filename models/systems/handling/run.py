@@ -250,7 +250,7 @@ class ManoeuvreRerun:
             base, coarse = self.in_double_step, self._with_net(other, 2.0)
         except RunFailed:
             base, coarse = principal_series(self.drive), self._with_net(other, 1.0)
-        creepages, fewer, more = (self._creep(count) for count in (cells, other, finer))
+        creepages, fewer, more = (self._creep_forces(count) for count in (cells, other, finer))
         apart, error = np.linalg.norm(creepages - fewer), np.linalg.norm(creepages - more) / (1.0 - 0.5**NET_ORDER)
         share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:
@@ -260,7 +260,7 @@ class ManoeuvreRerun:
             told[name] = replace(net, of=CELLS_KEY)
         return told
 
-    def _creep(self, cells: int) -> np.ndarray:
+    def _creep_forces(self, cells: int) -> np.ndarray:
         """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers

@@ -25,13 +25,13 @@ class SteadyTurn:
     """Steady turn per rad of steer: yaw rate (rad/s), and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
-    ``headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
+    ``towed_headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
     """
 
     yaw_gain: float
     side_gain: float
     understeer: float
-    headings: tuple[float, ...] = ()
+    towed_headings: tuple[float, ...] = ()
 
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:

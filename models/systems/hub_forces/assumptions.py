@@ -77,7 +77,7 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
                 for (hub, force), load in zip(_forces_at_hubs(run, vehicle, 1).items(), vehicle.loads, strict=True)
             },
             "of the load at rest",
-            most=LARGEST_SIDE_FORCE_SHARE,
+            upper_limit=LARGEST_SIDE_FORCE_SHARE,
         ),
         Assumption(
             "straight on",
@@ -101,7 +101,7 @@ def _pressing_assumptions(vehicle: CutVehicle, pull: float) -> list[Assumption]:
         "name the effect lift_off, whose tyres only push",
         lambda run: _forces_at_hubs(run, vehicle, 2),
         "N",
-        least=-pull,
+        lower_limit=-pull,
     )
     return [] if vehicle.uncut.lifts else [lifting]
 
@@ -185,7 +185,7 @@ def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
         f"raise forces.sampling_rate,{other} or lower road.speed",
         lambda run: {"shortest wave": np.array([road.speed / wave / rate])},
         "waves per sample",
-        most=WAVE_SHARE_OF_RULE[rule],
+        upper_limit=WAVE_SHARE_OF_RULE[rule],
     )
 
 

@@ -101,7 +101,7 @@ def filter_objections(scene: HubScene) -> tuple[str, ...]:
     from models.systems.hub_forces.run import Measurement
 
     vehicle = scene.cut_vehicle()
-    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.doubts
+    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.objections
 
 
 def _frames_text(vehicle: CutVehicle) -> str:

@@ -264,7 +264,7 @@ def labelled_result(
         engine=engine,
         counts=path.counts | {"states": path.states.shape[1]},
         seconds=seconds,
-        doubts=measurement.tilt.doubts if method == "kalman" else (),
+        doubts=measurement.tilt.objections if method == "kalman" else (),
         detail=path,
         method=method,
     )

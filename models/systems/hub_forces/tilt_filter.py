@@ -40,15 +40,15 @@ SIGNAL_REMEDY = "check signs, units, order of the hubs and frame, or state large
 @dataclass(frozen=True)
 class Tilt:
     """Output of the tilt filter. states (m, 4) : estimated roll, pitch and their rates; deviations : their standard
-    deviations; surprise : mean of the normalised innovation squared per measured value, 1 where the stated deviations
-    are right; doubts : objections to the measurement.
+    deviations; normalised_innovation : mean of the normalised innovation squared per measured value, 1 where the stated
+    deviations are right; objections : objections to the measurement.
     """
 
     states: np.ndarray
     deviations: np.ndarray
     period: float
-    surprise: float
-    doubts: tuple[str, ...] = ()
+    normalised_innovation: float
+    objections: tuple[str, ...] = ()
 
 
 @dataclass
@@ -109,18 +109,19 @@ class TiltFilter:
         turning, kept = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
         state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, kept)
-        if not self.surprise <= INNOVATION_LIMIT:
+        if not self.normalised_innovation <= INNOVATION_LIMIT:
             raise InputError(
                 self.file,
                 "angles",
                 None,
                 "contradict the hub forces: the squares of the innovations are "
-                f"{self.surprise:.3g} times what the deviations allow (at most {INNOVATION_LIMIT:g}): {SIGNAL_REMEDY}",
+                f"{self.normalised_innovation:.3g} times what the deviations allow (at most "
+                f"{INNOVATION_LIMIT:g}): {SIGNAL_REMEDY}",
             )
         return kept[0], kept[1]
 
     @property
-    def surprise(self) -> float:
+    def normalised_innovation(self) -> float:
         """Mean of the normalised innovations squared per measured value."""
         return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
 
@@ -136,12 +137,13 @@ class TiltFilter:
         along = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
         return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
 
-    def doubts(self) -> tuple[str, ...]:
+    def objections(self) -> tuple[str, ...]:
         """Objections to the measurement because innovations are too large or have a mean. A constant error of an angle
         leaves no trace in them.
         """
         large = (
-            f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
+            f"the filter's innovations squared are {self.normalised_innovation:.3g} times what the "
+            "stated deviations allow (up "
             f"to {DOUBTFUL_INNOVATION_LIMIT:g} is not said): {SIGNAL_REMEDY}"
         )
         mean, error = self.innovation_biases()
@@ -152,7 +154,7 @@ class TiltFilter:
             for name, average, wide in zip(MEASURED_VALUES, mean, error, strict=True)
             if abs(average) > max(BIAS_IN_DEVIATIONS, BIAS_IN_STANDARD_ERRORS * wide)
         ]
-        return (*([large] if self.surprise > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
+        return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
@@ -220,7 +222,7 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
     tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, deviations, file)
     states, spread = tilt_filter.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, tilt_filter.surprise, tilt_filter.doubts())
+    return Tilt(states, spread, forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
 
 
 def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ def _in_range(examination: "Examination | None") -> Assumption:
         "measure again with a wider range, or leave these times out by [clock]",
         lambda run: clipped(),
         "of the samples",
-        most=0.0,
+        upper_limit=0.0,
     )
 
 
@@ -95,7 +95,7 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
                 hub: force / load for (hub, force), load in zip(vertical().items(), vehicle.loads, strict=True)
             },
             "of the load at rest",
-            least=-LARGEST_PULL_SHARE,
+            lower_limit=-LARGEST_PULL_SHARE,
         ),
         Assumption(
             "balance",

@@ -48,14 +48,14 @@ class Consequence:
     """
 
     finding: Finding
-    section: str = ""
+    section_force: str = ""
     force: float = np.nan
     damage: float = np.nan
 
     @property
     def grade(self) -> int:
         """Grade of the consequence: 0 harmless, 1 doubtful or unknown, 2 not acceptable."""
-        if not self.section:
+        if not self.section_force:
             return 1
         return max(
             sum(abs(value) > bound for bound in bounds)
@@ -65,9 +65,12 @@ class Consequence:
     def __str__(self) -> str:
         """The consequence with its figures, as a sentence for an engineer."""
         where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
-        if not self.section:
+        if not self.section_force:
             return f"{where}: what it does to the section forces is not known"
-        return f"{where}: changes {self.section} by {self.force:.1%} of its rms, its damage is {self.damage:.3g} times"
+        return (
+            f"{where}: changes {self.section_force} by {self.force:.1%} of its rms, its damage is "
+            f"{self.damage:.3g} times"
+        )
 
 
 def consequences(
@@ -237,7 +240,7 @@ def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples
             values, gaps = filled_samples(samples[s], period, LONGEST_BRIDGED_GAP)
             out[s] = values.copy()
             for number, gap in enumerate(gaps):
-                out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.doubt)
+                out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.largest_deviation)
     return out
 
 

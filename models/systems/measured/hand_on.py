@@ -20,7 +20,7 @@ from models.systems.measured.sections import SectionChannel
 
 FILE_STEM = "section_forces"
 """Name of the files that are handed on, before their extensions."""
-COUNTED_FIGURES = ("least", "greatest", "mean")
+COUNTED_FIGURES = {"least": "smallest_load", "greatest": "largest_load", "mean": "mean"}
 
 
 def hand_on(
@@ -82,7 +82,10 @@ def labelled_result(
         slopes = list(next(iter(counted.values())).damage)
         axes["section_force"] = Channel("section_force", [answer.name for answer in counted])
         axes["slope"] = Channel("slope", slopes, "1", "Woehler exponent")
-        figures = {name: [getattr(counts, name) for counts in counted.values()] for name in COUNTED_FIGURES}
+        figures = {
+            name: [getattr(counts, attribute) for counts in counted.values()]
+            for name, attribute in COUNTED_FIGURES.items()
+        }
         figures["rms"] = [root_mean_square(outcome.samples(answer)) for answer in counted]
         channels |= {name: Channel("section_force", values, "", unit) for name, values in figures.items()}
         channels["unit"] = Channel("section_force", [answer.unit for answer in counted])

@@ -115,15 +115,15 @@ class Inputs:
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property
-    def used(self) -> tuple[Signal, ...]:
+    def used_signals(self) -> tuple[Signal, ...]:
         """Signals that drive or hold the run."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
     def wrenches(self, first: int, count: int) -> np.ndarray:
         """Hub forces (count, 6 h), N and N m, at samples from ``first`` on; components that were not measured are 0."""
-        return self._block(self.hubs, first, count, 0.0)
+        return self._signal_block(self.hubs, first, count, 0.0)
 
-    def around(self, first: int, count: int) -> np.ndarray:
+    def wrenches_with_neighbours(self, first: int, count: int) -> np.ndarray:
         """``wrenches`` with one more sample before and two after; beyond an end the recording is mirrored in its end
         point.
         """
@@ -135,18 +135,18 @@ class Inputs:
         """Roll, pitch and their rates (n, 4), NaN where not measured; rates that gyros measured are converted to rates
         of the angles.
         """
-        tilt = self._block(self.angles, first, count, np.nan)
+        tilt = self._signal_block(self.angles, first, count, np.nan)
         if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
             known = np.isfinite(tilt[:, 2:])
             roll, pitch, p, q = np.nan_to_num(tilt).T
-            r = np.nan_to_num(self._block([self.yaw], first, count, 0.0)[:, 0])
+            r = np.nan_to_num(self._signal_block([self.yaw], first, count, 0.0)[:, 0])
             rates = np.column_stack(
                 [p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch), q * np.cos(roll) - r * np.sin(roll)]
             )
             tilt[:, 2:] = np.where(known, rates, np.nan)
         return tilt
 
-    def _block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
+    def _signal_block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
         out = np.full((min(count, self.recording.count - first), len(signals)), missing)
         for i, signal in enumerate(signals):
             if signal is not None:

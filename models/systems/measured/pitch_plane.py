@@ -84,7 +84,7 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     result = simulate(scene, job.engine, error=error)
     limited = trusted_time(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS_NAME, "pitch"):
-        limited = replace(limited, unchecked="")  # the run is compared with it
+        limited = replace(limited, unchecked_text="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
@@ -158,7 +158,7 @@ def trusted_time(scene: Scene, deviation: float) -> Trust | None:
     bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
-    noise = drift_trust.noise(assembly, deviation).passes(bounds.angle)
+    noise = drift_trust.noise(assembly, deviation).passing_time(bounds.angle)
     return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 

@@ -76,10 +76,10 @@ class Examination:
     runs: dict[str, SectionOutcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
-    compared: tuple[ChannelComparison, ...] = ()
+    channel_comparisons: tuple[ChannelComparison, ...] = ()
     plane: Result | None = None
     counted: dict[SectionChannel, CountedLoad] = field(default_factory=dict)
-    handed: tuple[Path, ...] = ()
+    handed_files: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     temporary_folder: "TemporaryDirectory[str] | None" = None
@@ -92,24 +92,24 @@ class Examination:
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
-    def stopped(self) -> bool:
+    def is_stopped(self) -> bool:
         """Whether the recording has an error because of which no run is made."""
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
-    def chosen(self) -> str:
+    def chosen_run(self) -> str:
         """Name of the run that is handed on: with the stabiliser, or free where the scene names none."""
         return [*self.holds][-1]
 
     @property
     def outcome(self) -> SectionOutcome | None:
         """The outcome of the run that is handed on; None where no run was made."""
-        return self.runs.get(self.chosen)
+        return self.runs.get(self.chosen_run)
 
     def put_in(self, signal: Signal) -> bool:
         """Whether a signal drives or holds the vehicle; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
-        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE_RUN))
+        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
 
     def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
         """Section forces and moments of a run at the sections that the scene names, or at all sections if it names
@@ -139,7 +139,7 @@ class Examination:
         if isinstance(job, SectionRun):
             return march(job, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
-        run = run_plane(job, folder, self.scene.limits, error and name == self.chosen)
+        run = run_plane(job, folder, self.scene.limits, error and name == self.chosen_run)
         self.verdicts[name], self.plane = run.verdict, run.result
         if name == FREE_RUN and run.trust is not None:
             self.trust = (("pitch", run.trust),)
@@ -174,7 +174,7 @@ def run(
         _examine(exam, folder, progress, error)
     else:
         begun = time.process_time()
-        exam.runs[exam.chosen] = exam.march(exam.chosen, folder / WORK_FOLDER / exam.chosen, error=error)
+        exam.runs[exam.chosen_run] = exam.march(exam.chosen_run, folder / WORK_FOLDER / exam.chosen_run, error=error)
         exam.seconds["march"] = time.process_time() - begun
     labelled = _judged_by_assumptions(_labelled_result(scene, exam, folder), exam)
     try:
@@ -182,8 +182,8 @@ def run(
     except RunFailed as failure:
         if not whole_run:
             raise
-        exam.failed[exam.chosen] = str(failure)
-        exam.verdicts[exam.chosen] = Verdict("rejected", failure.reason)
+        exam.failed[exam.chosen_run] = str(failure)
+        exam.verdicts[exam.chosen_run] = Verdict("rejected", failure.reason)
         labelled.data.attrs |= _endings_of_runs(exam)
         return labelled
 
@@ -204,11 +204,11 @@ def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
 
 def _with_error(run: Result, examination: Examination, work: Path) -> Result:
     """The result with the error of the steps of the run that is handed on."""
-    job, outcome = examination.job(examination.chosen), examination.outcome
+    job, outcome = examination.job(examination.chosen_run), examination.outcome
     if outcome is None or not isinstance(job, SectionRun):
         return run
-    if examination.chosen in examination.failed:
-        return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen]}")
+    if examination.chosen_run in examination.failed:
+        return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen_run]}")
     before = examination.virtual.errors if examination.virtual is not None else {}
     try:
         told = errors_of_steps(job, outcome, before, work)
@@ -255,7 +255,7 @@ def _examine(examination: Examination, folder: Path, progress: Progress, error: 
     progress("checks", 0.2)
     examination.findings = findings_of_all_checks(examination.evidence)
     lap("checks")
-    if examination.stopped:
+    if examination.is_stopped:
         return
     if examination.rig.vehicle is not None:
         _predict_drift(examination, examination.rig.vehicle)
@@ -292,10 +292,10 @@ def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
     frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
     level = Level(free.force, free.moment, bias, tilt, rate)
     examination.drift = predicted_drift(vehicle, level, recording.period, recording.duration, frame)
-    lacking = examination.evidence.lacking
+    lacking = examination.evidence.missing_data_text
     rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
     examination.trust = tuple(
-        (what, replace(examination.drift.trust(angle), unchecked=rest))
+        (what, replace(examination.drift.trust(angle), unchecked_text=rest))
         for what, angle in (("section forces", None), ("motion", UNTRUSTED_PITCH))
     )
 
@@ -356,12 +356,12 @@ def _with_verdicts(examination: Examination) -> None:
             job,
             outcome,
             examination.scene.limits,
-            examination.drift.passes(examination.drift.angle) or recording.duration,
+            examination.drift.passing_time(examination.drift.angle) or recording.duration,
             [compared for compared in beside if compared.signal.check],
             {s.name: noise(recording, s) for s in recording.signals if s.check},
         )
-        if name == examination.chosen:
-            examination.compared = beside
+        if name == examination.chosen_run:
+            examination.channel_comparisons = beside
 
 
 def _with_consequences(examination: Examination, work: Path) -> None:
@@ -369,8 +369,8 @@ def _with_consequences(examination: Examination, work: Path) -> None:
     used, or the free run where that failed.
     """
     name = (
-        examination.chosen
-        if examination.chosen in examination.runs and examination.chosen not in examination.failed
+        examination.chosen_run
+        if examination.chosen_run in examination.runs and examination.chosen_run not in examination.failed
         else FREE_RUN
     )
     if name in examination.runs:
@@ -390,9 +390,11 @@ def _save_section_forces(examination: Examination, outcome: SectionOutcome, fold
     """
     answers, wanted = examination.forces(outcome), examination.scene.hand_on
     examination.counted = {answer: counted_load(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
-    examination.handed = tuple(folder / f"{FILE_STEM}.{form}" for form in wanted.formats)
-    formats = [path.suffix[1:] for path in examination.handed if not path.exists()]
-    comment = f"{examination.scene.title}; computed from wheel forces, {examination.chosen} run, {examination.engine}"
+    examination.handed_files = tuple(folder / f"{FILE_STEM}.{form}" for form in wanted.formats)
+    formats = [path.suffix[1:] for path in examination.handed_files if not path.exists()]
+    comment = (
+        f"{examination.scene.title}; computed from wheel forces, {examination.chosen_run} run, {examination.engine}"
+    )
     hand_on(outcome, folder, formats, answers, examination.recording.start, comment)
 
 
@@ -407,7 +409,7 @@ def _labelled_result(scene: MeasuredScene, examination: Examination, folder: Pat
         seconds=examination.seconds.get("march", 0.0),
         doubts=[finding.text for finding in examination.findings if finding.weight != "note"],
         detail=examination,
-        run=examination.chosen,
+        run=examination.chosen_run,
         **_endings_of_runs(examination),
     )
 

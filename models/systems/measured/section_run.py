@@ -86,17 +86,18 @@ class SectionRun:
 
 @dataclass(frozen=True)
 class SectionOutcome:
-    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``surprise`` and ``doubts`` of
-    the filter about its measurements, NaN and none without one; counts of steps, force calls and states.
+    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``normalised_innovation`` and
+    ``filter_objections`` of the filter about its measurements, NaN and none without one; counts of steps, force calls
+    and states.
     """
 
     columns: Columns
     answers: tuple[SectionChannel, ...]
     period: float
     done: int
-    surprise: float
+    normalised_innovation: float
     findings: tuple[Finding, ...]
-    doubts: tuple[str, ...] = ()
+    filter_objections: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
 
     def samples(self, answer: SectionChannel | str) -> np.ndarray:
@@ -214,9 +215,9 @@ class _March:
             self.job.sections.answers,
             self.grid.period * self.grid.samples_per_output,
             self.done,
-            self.filter.surprise if self.filter else math.nan,
+            self.filter.normalised_innovation if self.filter else math.nan,
             tuple(self.inputs.findings),
-            self.filter.doubts() if self.filter else (),
+            self.filter.objections() if self.filter else (),
             {"steps": steps, "force calls": 4 * steps, "states": 2 * self.job.vehicle.size},
         )
 
@@ -279,7 +280,7 @@ class _March:
         """
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
-        wrenches = self.inputs.around(first, used + 1)
+        wrenches = self.inputs.wrenches_with_neighbours(first, used + 1)
         free = HubInputs(grid.cubic_rows(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
             return replace(free, guide=self.prescribed.rows(first, rows))
@@ -326,7 +327,7 @@ def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))
     samples = digest_of(job.recording.period, job.recording.count)
-    for signal in inputs.used:
+    for signal in inputs.used_signals:
         samples = digest_of(samples, signal, job.recording.samples(signal))
     return {
         "vehicle": digest_of(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),

@@ -53,25 +53,26 @@ class Level:
 class Drift:
     """Drift of a free run that the errors of its measurement cause.
 
-    means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
-    deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
+    mean_errors : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) :
+    standard deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
     """
 
     times: np.ndarray
-    means: dict[str, np.ndarray]
+    mean_errors: dict[str, np.ndarray]
     deviations: np.ndarray
     rates: np.ndarray
     frame: str = "hub"
 
-    def passes(self, angle: float = UNTRUSTED_PITCH, source: str | None = None) -> float | None:
+    def passing_time(self, angle: float = UNTRUSTED_PITCH, source: str | None = None) -> float | None:
         """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad).
 
-        source : one of ``means`` or "noise" alone; None: all together.
+        source : one of ``mean_errors`` or "noise" alone; None: all together.
         """
         from scipy.special import ndtr
 
         mean = sum(
-            (means for name, means in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3))
+            (means for name, means in self.mean_errors.items() if source in (None, name)),
+            np.zeros((len(self.times), 3)),
         )
         spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
         mean, deviation = mean[:, :2], np.maximum(spread[:, :2], 1e-300)
@@ -85,9 +86,9 @@ class Drift:
         return UNTRUSTED_PITCH if self.frame == "inertial" else UPRIGHT
 
     @property
-    def trusted(self) -> float:
+    def trusted_time(self) -> float:
         """Time (s) until which the section forces of a free run are trusted; at most the duration of the run."""
-        passed = self.passes(self.angle)
+        passed = self.passing_time(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
     def trust(self, angle: float | None = None) -> Trust:
@@ -95,8 +96,8 @@ class Drift:
         the motion itself.
         """
         limit = self.angle if angle is None else angle
-        times = {name: self.passes(limit, name) for name in ("noise", *self.means)}
-        return Trust({**times, "all together": self.passes(limit)}, float(self.rates.max()), limit)
+        times = {name: self.passing_time(limit, name) for name in ("noise", *self.mean_errors)}
+        return Trust({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
 
 
 def predicted_drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:

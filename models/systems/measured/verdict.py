@@ -76,19 +76,19 @@ class Band:
 class ChannelComparison:
     """Comparison of one check channel with the run.
 
-    offset : mean of the error; bands : of all but that; explained : part of the measured variance that the run gives,
-    1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
-    trusted : s until the error of a stretch of ``STRETCH_LENGTH`` s exceeds ``STRETCH_ERROR_LIMIT`` of the channel's
-    rms, infinite if never.
+    offset : mean of the error; bands : of all but that; explained_variance : part of the measured variance that the run
+    gives, 1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
+    trusted_time : s until the error of a stretch of ``STRETCH_LENGTH`` s exceeds ``STRETCH_ERROR_LIMIT`` of the
+    channel's rms, infinite if never.
     """
 
     signal: Signal
     answer: SectionChannel
     offset: float
     bands: tuple[Band, ...]
-    explained: float
+    explained_variance: float
     damage: dict[float, float]
-    trusted: float
+    trusted_time: float
 
 
 def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
@@ -216,14 +216,17 @@ def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
     """Doubts because the innovations of the filter that held a run are too large, or because it calls measurements
     biased.
     """
-    if not run.surprise > DOUBTFUL_INNOVATION_LIMIT:
-        return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
+    if not run.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT:
+        return tuple(
+            Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.filter_objections
+        )
     text = (
-        f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
+        f"The filter's innovations squared are {run.normalised_innovation:.3g} times what the noise of "
+        "forces and angles "
         "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
         "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much."
     )
-    return (Finding("filter", "doubt", "recording", text, run.surprise, "1"),)
+    return (Finding("filter", "doubt", "recording", text, run.normalised_innovation, "1"),)
 
 
 def judge_beside_truth(

@@ -69,13 +69,13 @@ def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
         "use tyres that are stiffer (vehicle.override), or drive more slowly",
         partial(_deflections, assembly.parameters),
         "m",
-        most=LARGEST_TYRE_TRAVEL,
+        upper_limit=LARGEST_TYRE_TRAVEL,
     )
     if lifts:
         return [pressed]
     says, remedy = "linear tyres stay on the road", "name the effect lift_off, whose tyres only push"
     forces = watch_function(front_wheel="f1", rear_wheel="f2")
-    return [Assumption("tyres press", says, remedy, forces, "N", least=-PULL_LIMIT), pressed]
+    return [Assumption("tyres press", says, remedy, forces, "N", lower_limit=-PULL_LIMIT), pressed]
 
 
 def _deflections(p: Parameters, run: Result) -> Watched:
@@ -96,7 +96,7 @@ def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
         remedy,
         partial(_compressions, assembly.parameters, assembly.vehicle.geometry == "exact"),
         "m",
-        least=-SPRING_EDGE,
+        lower_limit=-SPRING_EDGE,
     )
 
 
@@ -134,7 +134,7 @@ def _artificial_assumption(assembly: Assembly) -> Assumption:
         moved if assembly.guided else soft,
         partial(_artificial_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",
-        most=ARTIFICIAL_SHARE_LIMIT,
+        upper_limit=ARTIFICIAL_SHARE_LIMIT,
     )
 
 

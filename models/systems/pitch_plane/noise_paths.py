@@ -68,7 +68,7 @@ class NoisePaths:
         """Trajectory of one path over the whole run; RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
-    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
         """Trajectory of each path, or its RunFailed; PathFailed for a failure that is not one of the simulated
         physics.
         """
@@ -87,7 +87,7 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        columns = zip(*map(self._saved_part, self.runs(paths)), strict=True)
+        columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
     def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
@@ -176,7 +176,7 @@ class MujocoThreads(NoisePaths):
         if self.engine != "mujoco" or self.base.guided:
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
-    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
         """Trajectory of each path, all from one call of ``rollout``. If MuJoCo warns, the paths are run again one by
         one.
         """

@@ -141,9 +141,9 @@ class PitchEstimate:
     states : (n, 7), see above
     covariances : (n, 7, 7), without what the force sample of that very instant has done already
     pending_noise : (n, 7, 2), what it has: a root of its covariance
-    used, missed : (n,) measured values that were taken in, and that were no numbers
-    normalised_innovations : (n,) normalised innovation squared, chi-square of ``used`` degrees of freedom where the
-    filter is
+    used_values, missed_values : (n,) measured values that were taken in, and that were no numbers
+    normalised_innovations : (n,) normalised innovation squared, chi-square of ``used_values`` degrees of freedom where
+    the filter is
         consistent; NaN where nothing was measured
     innovations : (n, columns), whitened: independent and of deviation 1 where it is; NaN where nothing was measured
     """
@@ -152,8 +152,8 @@ class PitchEstimate:
     states: np.ndarray
     covariances: np.ndarray
     pending_noise: np.ndarray
-    used: np.ndarray
-    missed: np.ndarray
+    used_values: np.ndarray
+    missed_values: np.ndarray
     normalised_innovations: np.ndarray
     innovations: np.ndarray
 

@@ -97,7 +97,7 @@ def trust_line(assembly: Assembly) -> list[str]:
     if limit is None:
         return []
     if limit.until is None and assembly.doubts:
-        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked}")]
+        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked_text}")]
     return [_line("trust", str(limit))]
 
 

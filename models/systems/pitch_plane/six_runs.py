@@ -84,7 +84,7 @@ def figures_of_run(engine: str, name: str, measured_run: Result, run: Result) ->
     figures: dict[str, Any] = {
         "engine": engine,
         "run": name,
-        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passes(DRIFT_OFF_PITCH),
+        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passing_time(DRIFT_OFF_PITCH),
         "heave error": float(np.abs(error(measured_run, run, "z3")).max()),
     }
     if "enforced_moment" in run.data:

@@ -167,9 +167,9 @@ class Bench:
     @property
     def pitch_inertia(self) -> float:
         """Inertia I + J in kg m^2 that a moment on the pitch has to turn."""
-        return rigid_pitch(self.parameters).total
+        return rigid_pitch(self.parameters).total_inertia
 
-    def spring(self, stiffness: float) -> dict[str, float]:
+    def spring_settings(self, stiffness: float) -> dict[str, float]:
         """Settings of a spring to the ground, with a damper of fixed damping ratio."""
         return {"stiffness": stiffness, "damping": 2.0 * DAMPING_RATIO * math.sqrt(stiffness * self.pitch_inertia)}
 
@@ -179,9 +179,9 @@ class Bench:
         sure = {"file": noisy, "pitch_deviation": options.angle_deviation, "force_deviation": self.deviation}
         filtered = {**sure, "inertia_deviation": options.inertia_deviation}
         smoothed = {"file": noisy, "bandwidth": options.bandwidth}
-        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring(k)} for k in options.stiffnesses}
+        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring_settings(k)} for k in options.stiffnesses}
         stiffest = max(options.stiffnesses)
-        banded = {"pitch_spring": {**self.spring(stiffest), "dead_band": options.dead_band}}
+        banded = {"pitch_spring": {**self.spring_settings(stiffest), "dead_band": options.dead_band}}
         passes = {
             f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING_RATIO}}
             for f in options.cut_offs
@@ -209,13 +209,13 @@ class Bench:
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
             progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
-            of_method = self._scored(engine, name, effects, failed)
+            of_method = self._rows_of_run(engine, name, effects, failed)
             rows += of_method
             if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
-                rows += [row for other in other_engines for row in self._scored(other, name, effects, failed)]
+                rows += [row for other in other_engines for row in self._rows_of_run(other, name, effects, failed)]
         return rows
 
-    def _scored(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
+    def _rows_of_run(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
         """One row of figures, or none if the run fails."""
         start = time.perf_counter()
         try:
@@ -281,7 +281,7 @@ class Bench:
             high_pass = {"high_pass": {"cut_off": cut_off, "damping_ratio": DAMPING_RATIO}}
             sprung, passed = (
                 errors_of_run(self.simulate("reference", effects), self.truth, self.options.slope)
-                for effects in ({"pitch_spring": self.spring(stiffness)}, high_pass)
+                for effects in ({"pitch_spring": self.spring_settings(stiffness)}, high_pass)
             )
             worst = max(sprung.damage.values(), key=lambda ratio: abs(math.log(ratio)))
             rows.append((stiffness, sprung.pitch_max, passed.pitch_max, worst))

@@ -160,7 +160,7 @@ class TangentPath:
         return self.per_sample * self.samples
 
     @property
-    def inputs(self) -> np.ndarray:
+    def forces_at_stages(self) -> np.ndarray:
         """The wheel forces (rows, 2) in N at the stages of all steps."""
         if self.forces.held:
             return self.forces.sample(0.0, self.step, self.steps)
@@ -168,7 +168,7 @@ class TangentPath:
 
     def given(self, errors: np.ndarray) -> StageForces:
         """The wheel forces at the stages of all steps, together with their errors (rows, m, 2) in N."""
-        return StageForces(self.step, self.inputs, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
+        return StageForces(self.step, self.forces_at_stages, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
 
     def march(self, compile_march: Any):
         """The compiled march for the mode and geometry of the assembly."""

@@ -44,7 +44,9 @@ SMALL_PITCH = 0.2
 def small_errors(angle: float) -> Assumption:
     """Assumption that ``angle``, up to which a run is trusted, is small enough for the laws of growth."""
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
-    return Assumption("small errors", says, remedy, partial(_watched_allowed_error, angle), "rad", most=SMALL_PITCH)
+    return Assumption(
+        "small errors", says, remedy, partial(_watched_allowed_error, angle), "rad", upper_limit=SMALL_PITCH
+    )
 
 
 def _watched_allowed_error(angle: float, run: Result) -> Watched:
@@ -71,7 +73,7 @@ class GrowthCurve:
     times: np.ndarray
     size: np.ndarray
 
-    def passes(self, angle: float = UNTRUSTED_PITCH) -> float | None:
+    def passing_time(self, angle: float = UNTRUSTED_PITCH) -> float | None:
         """First time (s) at which the error exceeds ``angle`` (rad), None if it never does."""
         beyond = ~(self.size <= angle)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
@@ -98,7 +100,7 @@ def _covering_samples(path: TangentPath) -> np.ndarray:
 def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
     """Pitch error from white noise of ``deviation`` (N) on each force sample: median of its size over noise paths."""
     growing, period = pitch_error_growth(assembly), path_of(assembly).forces.period
-    intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
+    intensity = rigid_pitch(assembly.parameters).noise_intensity(deviation, period)
     return GrowthCurve(
         growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity))
     )
@@ -113,7 +115,7 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     spline as late as that, and err by -f'' T^2 / 24 on average.
     """
     spline = Smooth(_covering_samples(path), path.forces.period, degree=5)
-    count, given = path.steps, path.inputs
+    count, given = path.steps, path.forces_at_stages
     late = path.forces.period / 2 if path.forces.held else 0.0
     true = spline.sample(-late, path.step / 2, 2 * count + 1)
     read = [given] * 3 if path.forces.held else [given[0:-1:2], given[1::2], given[2::2]]
@@ -165,13 +167,13 @@ class Trust:
     """Times (s) at which each source of error ends the trust in a run, None where it does not; ``rate`` in 1/s,
     ``angle`` in rad.
 
-    unchecked : what was not looked at, with what would show it.
+    unchecked_text : what was not looked at, with what would show it.
     """
 
     times: dict[str, float | None]
     rate: float
     angle: float
-    unchecked: str = ""
+    unchecked_text: str = ""
 
     @property
     def until(self) -> tuple[str, float] | None:
@@ -181,7 +183,10 @@ class Trust:
 
     def __str__(self) -> str:
         """The line that describes this trust in a plan."""
-        grown, rest = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s", self.unchecked and f"; {self.unchecked}"
+        grown, rest = (
+            f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s",
+            self.unchecked_text and f"; {self.unchecked_text}",
+        )
         if self.until is None:
             return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
         name, time = self.until
@@ -198,13 +203,13 @@ def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust |
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times = {"interpolation between the samples": interpolation(assembly).passes(angle)}
+    times = {"interpolation between the samples": interpolation(assembly).passing_time(angle)}
     added = assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
-        times[named] = noise(assembly, added.deviation).passes(angle)
+        times[named] = noise(assembly, added.deviation).passing_time(angle)
     times |= _steady_drift_time(assembly, angle)
-    times["rounding"] = rounding_error_curve(assembly).passes(angle)
+    times["rounding"] = rounding_error_curve(assembly).passing_time(angle)
     return Trust(times, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
 
 
@@ -221,7 +226,7 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
     return {
         name: math.sqrt(2 * way / abs(acceleration))
         for (name, way), acceleration, seen in zip(
-            ways.items(), motion.accelerations.tolist(), motion.seen, strict=True
+            ways.items(), motion.accelerations.tolist(), motion.is_beyond_uncertainty, strict=True
         )
         if seen
     }

@@ -68,7 +68,7 @@ def _tyres(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
         return {f"tyre {name}": _raised_by(of(f"load {name}"), load) for name, load in loads.items()}
 
     remedy = f'{IN_TIME} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
-    yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", least=-PULL_LIMIT)
+    yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
 def _raised_by(values: np.ndarray | Gaussian, by: float) -> np.ndarray | Gaussian:
@@ -231,7 +231,7 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
         "take a smoother road or a slower speed: no effect lets them leave the seat",
         watched,
         "m/s^2",
-        least=-GRAVITY,
+        lower_limit=-GRAVITY,
     )
 
 
@@ -251,5 +251,5 @@ NEARLY_GAUSSIAN = Assumption(
         )
     },
     "",
-    most=LEFT_OUT_SHARE,
+    upper_limit=LEFT_OUT_SHARE,
 )

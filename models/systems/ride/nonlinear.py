@@ -65,16 +65,16 @@ class Nonlinear:
     """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
     Monte Carlo copies if the scene requests them.
 
-    shown : the statistically linearised vehicle at the speed of the engines' runs; lifts : whether tyres may lift,
-    which they do in Monte Carlo alone.
+    shown : the statistically linearised vehicle at the speed of the engines' runs; tyres_may_lift : whether tyres may
+    lift, which they do in Monte Carlo alone.
     """
 
     speeds: np.ndarray
-    small: np.ndarray
+    small_motion: np.ndarray
     linearised_vehicles: list[StatisticallyLinear]
     copies: dict[float, Copies]
     shown: StatisticallyLinear
-    lifts: bool = False
+    tyres_may_lift: bool = False
 
     def of(self, name: str) -> np.ndarray:
         """One quantity (N, p) of the statistically linearised vehicles, by its name."""
@@ -107,7 +107,7 @@ def linearised_result(
     copies = _copies_by_speed(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
-    by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small}
+    by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
     by_speed |= {part: linear_runs.of(part) for part in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
@@ -125,7 +125,7 @@ def linearised_result(
             "speed_of_copies": Channel("speed_of_copies", list(copies), "m/s"),
         },
         engine="reference",
-        counts={"iterations": sum(len(each.changes) for each in replaced)},
+        counts={"iterations": sum(len(each.gain_changes) for each in replaced)},
         seconds=time.process_time() - begun,
         detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),

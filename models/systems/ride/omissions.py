@@ -19,7 +19,7 @@ ALL_WHEELS = "mass of all wheels"
 TYRE_DAMPING = "tyre damping"
 LAW_TEXTS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
 """Laws of springs, and what leaving out those of all springs is called: stops, bent dampers, dry friction."""
-less, on_road = ReducedScene.less, ReducedScene.on_road
+less, on_road = ReducedScene.reduced_further, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
@@ -30,7 +30,7 @@ def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
     effects = {name: find(scene) for name, find in SORTS.items()}
     effects |= {
-        name: [Effect(name, partial(_without_table, name=name), table.COST, singular=True, has_table=True)]
+        name: [Effect(name, partial(_without_table, name=name), table.COST, is_singular=True, has_table=True)]
         for name, table in tables.items()
     }
     return tuple(
@@ -85,7 +85,7 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
         needs = (TYRE_DAMPING,) if white else ()
         why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
         says = f"{', '.join(bodies)} without mass"
-        return Effect(name, partial(less, massless=bodies), says, needs, excludes, why, singular=True)
+        return Effect(name, partial(less, massless=bodies), says, needs, excludes, why, is_singular=True)
 
     effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
     effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
@@ -140,7 +140,7 @@ def linear_law_effects(scene: ReducedScene) -> list[Effect]:
     anyway.
     """
     return [
-        Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", singular=True)
+        Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", is_singular=True)
         for law, name in LAW_TEXTS.items()
         if not scene.ride.vehicle.small_motion and any(getattr(spring, law) for spring in scene.vehicle.springs)
     ]
@@ -165,7 +165,7 @@ def locked_freedom_effects(scene: ReducedScene) -> list[Effect]:
         elif freedom != "z":
             shared[f"wheels {freedom}"].append((body, freedom))
     return [
-        Effect(name, partial(less, locked=group), f"locked: {', '.join(map(' '.join, group))}", singular=True)
+        Effect(name, partial(less, locked=group), f"locked: {', '.join(map(' '.join, group))}", is_singular=True)
         for name, group in (*groups.items(), *shared.items())
     ]
 
@@ -205,7 +205,7 @@ def second_track(scene: ReducedScene) -> list[Effect]:
     if not wide or scene.ride.road.left_right != "modelled":
         return []
     says = "left and right meet the same"
-    return [Effect("second track", partial(on_road, left_right="equal"), says, singular=True)]
+    return [Effect("second track", partial(on_road, left_right="equal"), says, is_singular=True)]
 
 
 def tyre_damping(scene: ReducedScene) -> list[Effect]:

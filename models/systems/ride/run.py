@@ -98,7 +98,7 @@ def _deviations_by_speed(
             "unit": Channel("output", list(swept.units)),
         },
         engine=engine,
-        counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct.values())},
+        counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct_counts.values())},
         seconds=time.process_time() - begun,
         detail=swept,
     )

@@ -112,19 +112,19 @@ class Spectral:
 
 @dataclass(frozen=True)
 class MotionAlongDrive:
-    """Motion along a drive. deviations : of the run's own outputs (time, ...); apart : of other outputs, as if each
-    speed had always been driven.
+    """Motion along a drive. deviations : of the run's own outputs (time, ...); speed_by_speed : of other outputs, as if
+    each speed had always been driven.
     """
 
     deviations: Mapping[str, np.ndarray]
-    apart: Spectral
+    speed_by_speed: Spectral
 
     def of(self, name: str) -> Gaussian:
         """Gaussian statistics of the motion of a part, by name: at every instant of a drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
-        return self.apart.of(name)
+        return self.speed_by_speed.of(name)
 
 
 def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
@@ -140,13 +140,13 @@ class MotionInRun:
     w).
     """
 
-    seen: LinearVehicle
+    watched_vehicle: LinearVehicle
     positions: np.ndarray
     rates: np.ndarray
     heights: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
         """Values of a motion at every row of the run."""
-        row = {output.name: output for output in self.seen.outputs}[name]
+        row = {output.name: output for output in self.watched_vehicle.outputs}[name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
         return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

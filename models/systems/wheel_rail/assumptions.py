@@ -51,7 +51,7 @@ def _half_space() -> Assumption:
         "lower wheelset.load, or compute with finite elements",
         _extreme_of_patches(share),
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
@@ -71,7 +71,7 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
         "use longer profiles or smaller positions",
         _extreme_of_patches(free, largest=False),
         "mm from the end",
-        least=0.0,
+        lower_limit=0.0,
     )
 
 
@@ -82,7 +82,7 @@ def _elastic_assumption() -> Assumption:
         "lower wheelset.load: a real contact would be larger and its pressure lower",
         _extreme_of_patches(lambda place: 1e-6 * place.peak),
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -96,7 +96,7 @@ def _small_creepage() -> Assumption:
         "lower the yaw: a wheel that slides is no rolling contact",
         _extreme_of_patches(largest),
         "",
-        most=SMALL_CREEPAGE,
+        upper_limit=SMALL_CREEPAGE,
     )
 
 
@@ -107,5 +107,5 @@ def _slow_slip(speed: float) -> Assumption:
         "give the case's friction as it is for such slip, or lower wheelset.speed",
         _extreme_of_patches(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
         "m/s",
-        most=FAST_SLIP,
+        upper_limit=FAST_SLIP,
     )

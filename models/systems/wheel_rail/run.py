@@ -56,12 +56,12 @@ PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class ContactsOfCase:
-    """Contacts of a case. placed : the contact at each position that has one; failed : reasons for the others, by
+    """Contacts of a case. placed : the contact at each position that has one; failures : reasons for the others, by
     position (mm); seconds : processor time of each.
     """
 
     placed: list[WheelsetPlacement] = field(default_factory=list)
-    failed: dict[float, str] = field(default_factory=dict)
+    failures: dict[float, str] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
 
 
@@ -89,7 +89,7 @@ def run(
             contacts.placed.append(held.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
-            contacts.failed[1e3 * shift] = (
+            contacts.failures[1e3 * shift] = (
                 f"a load of {held.load:g} N presses wheel and rail more than {1e3 * SURROUNDINGS_DISTANCE:g} mm into "
                 "each other"
                 if deep
@@ -110,7 +110,7 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
     for placed in run.detail.placed[::POSITIONS_PER_ERROR]:
         with suppress(InputError, RunFailed):
-            coarse.append(replace(contact, coarser=2.0 * contact.coarser).at(placed.shift, placed.yaw))
+            coarse.append(replace(contact, cell_factor=2.0 * contact.cell_factor).at(placed.shift, placed.yaw))
             fine.append(placed)
     if not coarse:
         return not_estimated(run, "no position is found on half the cells")
@@ -156,7 +156,7 @@ def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase)
         )
         for key, (unit, _, _) in PATCH_QUANTITIES.items()
     }
-    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failed.items()]
+    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failures.items()]
     return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
 
 

@@ -54,7 +54,7 @@ def of_linear(wheelset: Wheelset) -> list[Assumption]:
             "raise wheelset.override.friction",
             lambda run: {"rails": np.array([wheelset.friction])},
             "",
-            least=LEAST_FRICTION,
+            lower_limit=LEAST_FRICTION,
         )
     ]
 
@@ -99,7 +99,7 @@ def _wheels_press(wheelset: Wheelset) -> Assumption:
             lambda path: sums_by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))
         ),
         "N",
-        least=LEAST_LOAD * wheelset.load / 2.0,
+        lower_limit=LEAST_LOAD * wheelset.load / 2.0,
     )
 
 
@@ -122,7 +122,7 @@ def _rolling_assumption(equations: Equations) -> Assumption:
         f"travel at {wf.REGULAR:g} m/s or more",
         lambda run: {"wheelset": np.array([abs(equations.speed)])},
         "m/s",
-        least=wf.REGULAR,
+        lower_limit=wf.REGULAR,
     )
 
 
@@ -141,7 +141,7 @@ def _half_space() -> Assumption:
         "lower the load, or use profiles whose radii are larger",
         _watch_of_patches(watched),
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
@@ -156,7 +156,7 @@ def _elastic_assumption() -> Assumption:
         "lower the load or the displacement: real contacts would be larger, and their pressure lower",
         _watch_of_patches(watched),
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -168,7 +168,7 @@ def _slow_slip(equations: Equations) -> Assumption:
         "give wheelset.override.friction as it is for such slip, or travel slower",
         _watch_of_patches(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
         "m/s",
-        most=FAST_SLIP,
+        upper_limit=FAST_SLIP,
     )
 
 
@@ -185,7 +185,7 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
         'name the effect fastsim: contact.law = "fastsim"',
         _watch_of_path(watched),
         "mu N",
-        most=NO_SLIP,
+        upper_limit=NO_SLIP,
     )
 
 
@@ -200,7 +200,7 @@ def _travel_assumption(wheelset: Wheelset) -> Assumption:
         "stiffen the suspension: real guides have stops",
         _watch_of_path(watched),
         "mm",
-        most=1e3 * LARGEST_TRAVEL,
+        upper_limit=1e3 * LARGEST_TRAVEL,
     )
 
 
@@ -215,7 +215,7 @@ def _climbing_assumption(wheelset: Wheelset) -> Assumption:
         "name the effect profiles, which show it",
         _watch_of_path(watched),
         "of the wheel's load",
-        most=max(0.0, nadal_limit(wheelset.friction)),
+        upper_limit=max(0.0, nadal_limit(wheelset.friction)),
     )
 
 
@@ -226,7 +226,7 @@ def _flange_way(wheelset: Wheelset, watched: Callable[[Result], Watched] | None 
         "name the effect profiles, which have flanges of their own",
         watched or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
-        most=wheelset.flange_clearance + FLANGE_WAY,
+        upper_limit=wheelset.flange_clearance + FLANGE_WAY,
     )
 
 
@@ -255,7 +255,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
         "start with a smaller displacement, or use longer profiles",
         _watch_of_path(watched),
         "mm",
-        least=0.0,
+        lower_limit=0.0,
     )
 
 

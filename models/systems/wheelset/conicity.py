@@ -31,13 +31,13 @@ CONICITY_CHANNELS = {
 @dataclass(frozen=True, eq=False)
 class Conicities:
     """Equivalent conicities. table : rolling radius differences (m); rows : one per amplitude, not a number where there
-    is no wave; why : reasons for that, by amplitude (m); source : text on what the table describes; wavelengths : of
-    the rows (m).
+    is no wave; missing_reasons : reasons for that, by amplitude (m); source : text on what the table describes;
+    wavelengths : of the rows (m).
     """
 
     table: RollingRadiusTable
     rows: tuple[ConicityRow, ...]
-    why: dict[float, str]
+    missing_reasons: dict[float, str]
     source: str
     wavelengths: tuple[float, ...]
 
@@ -123,8 +123,8 @@ def _table(
 
 def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
     """Raise InputError where the wheelset has no wave at any of the scene's amplitudes."""
-    if len(conicities.why) == len(conicities.rows):
-        amplitude, why = next(iter(conicities.why.items()))
+    if len(conicities.missing_reasons) == len(conicities.rows):
+        amplitude, why = next(iter(conicities.missing_reasons.items()))
         table = scene.conicity.table if scene.conicity else None
         raise InputError(table or scene.file, "conicity.amplitudes", amplitude, why)
 
@@ -147,8 +147,8 @@ def conicity_lines(conicities: Conicities) -> list[str]:
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     told = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):
-        if row.amplitude in conicities.why:
-            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.why[row.amplitude]}")
+        if row.amplitude in conicities.missing_reasons:
+            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.missing_reasons[row.amplitude]}")
             continue
         error = f"{row.spacing_error:>10.1g}" if math.isfinite(row.spacing_error) else f"{'-':>10}"
         wave = f"{wavelength:>12.5g} m" if math.isfinite(wavelength) else f"{'no wave':>14}"

@@ -112,14 +112,14 @@ def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Linearised motion. values (speeds, 9) : eigenvalues in 1/s at speeds (m/s); wavelength (m) : of the free
-    wheelset; critical_speed : critical speed (m/s), None if there is none; why : the reason.
+    wheelset; critical_speed : critical speed (m/s), None if there is none; no_critical_reason : the reason.
     """
 
     speeds: np.ndarray
     values: np.ndarray
     wavelength: float
     critical_speed: float | None
-    why: str
+    no_critical_reason: str
 
     @property
     def hunting(self) -> np.ndarray:

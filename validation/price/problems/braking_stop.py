@@ -53,12 +53,12 @@ SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12
 class TapedController:
     """Wrapper of a controller that records the valve commands."""
 
-    inner: Controller
+    controller: Controller
     valves: list[int]
 
     def sample(self, sample: Sample) -> Command:
         """Command of the wrapped controller for a sample."""
-        command = self.inner.sample(sample)
+        command = self.controller.sample(sample)
         self.valves.append(int(np.asarray(command.valves)[0]))
         return Command(valves=np.array(self.valves[-1:]))
 
@@ -183,9 +183,11 @@ class BrakingStop:
             SAMPLE / substeps,
             self.speed,
         )
-        if stop.rest < 0:
+        if stop.step_of_rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return StopResult(stop.distance, {"steps": stop.rest, "force calls": CALLS_PER_STEP[OWN_METHOD] * stop.rest})
+        return StopResult(
+            stop.distance, {"steps": stop.step_of_rest, "force calls": CALLS_PER_STEP[OWN_METHOD] * stop.step_of_rest}
+        )
 
     def _stop_by_method(self, method: str, substeps: int) -> StopResult:
         number = (EULER, RK4, LITERAL).index(method)

@@ -44,7 +44,7 @@ def _sample_of_position(scene: WheelRailScene) -> Sample | None:
     made = run(scene, error=True)
     told, case = errors_of(made), next(iter(scene.cases.values()))
     held = scene.contact(case)
-    fine = replace(held, coarser=held.coarser / FINER_CELLS)
+    fine = replace(held, cell_factor=held.cell_factor / FINER_CELLS)
     placed = made.detail.placed
     gaps = np.array(
         [

@@ -143,7 +143,7 @@ TABLE = {
         {"controllers": 1},
         excludes=MEASURED_PRESSURES_KEY,
         why="which leaves a controller nothing to control",
-        usual={"kind": "slip_bang_bang"},
+        usual_value={"kind": "slip_bang_bang"},
         there=lambda scene: scene.controller.kind != "none",
     ),
     "faults": Entry(
@@ -152,7 +152,7 @@ TABLE = {
         "one look at each fault per sample",
         {"asked": 1},
         ("port",),
-        usual=[{"kind": "lost", "start": 0.1, "end": 0.2}],
+        usual_value=[{"kind": "lost", "start": 0.1, "end": 0.2}],
         there=lambda scene: scene.port is not None and bool(scene.port.faults),
     ),
     "hysteresis": _of_brakes(
@@ -171,7 +171,7 @@ TABLE = {
         {"moving loads": 4},
         excludes=SUSPENSION_KEY,
         why="whose springs carry the loads",
-        usual={},
+        usual_value={},
     ),
     "measured_pressures": Entry(
         "Pressures from a file in place of pedal and controller",
@@ -186,7 +186,7 @@ TABLE = {
         {"asked": 1},
         excludes=MEASURED_PRESSURES_KEY,
         why="which leaves no controller that could be asked",
-        usual={},
+        usual_value={},
     ),
     "pressure_calibration": _of_sensor(
         "pressures",
@@ -203,7 +203,7 @@ TABLE = {
         {"time constants": 8},
         excludes=MEASURED_PRESSURES_KEY,
         why="which are the chambers'",
-        usual={},
+        usual_value={},
     ),
     "pressure_noise": _of_sensor(
         "pressures",
@@ -235,7 +235,7 @@ TABLE = {
         "tyres.own_rear",
         "a second table of friction per surface",
         {"tables": 1},
-        usual=True,
+        usual_value=True,
     ),
     "relaxation": Entry(
         "Slip angles that lag behind the motion by a relaxation length",
@@ -243,7 +243,7 @@ TABLE = {
         "a state per wheel, exact within a step",
         {"lags": 4},
         modules=("models.brake.relaxation",),
-        usual={"front": 0.3, "rear": 0.3},  # m, chosen
+        usual_value={"front": 0.3, "rear": 0.3},  # m, chosen
     ),
     "reservoir": Entry(
         "A reservoir whose pressure falls as chambers fill from it",
@@ -251,7 +251,7 @@ TABLE = {
         "a sum over the chambers per sample",
         {"volumes": 4},
         ("pressure_dynamics",),
-        usual=40.0,  # l, of a truck
+        usual_value=40.0,  # l, of a truck
         leave_out=_without_reservoir,
     ),
     "second_surface": Entry(
@@ -309,7 +309,7 @@ TABLE = {
         "the edges of every wheel within each sample",
         {"asked": 1},
         ("port",),
-        usual={},
+        usual_value={},
     ),
     "towed": Entry(
         "Bodies that the vehicle of a file tows by a hitch, on springs and wheels of their own",

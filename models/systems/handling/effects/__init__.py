@@ -97,7 +97,7 @@ TABLE = {
         "tyres.inclination",
         "nothing: the same forces at an angle, with spin",
         {"leaning wheels": 4},
-        usual=0.02,
+        usual_value=0.02,
     ),
     "trailer": Entry(
         "Bodies that the vehicle tows by a hitch, on springs and wheels of their own",

@@ -97,7 +97,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
     stiffness, damping = spring_of(assembly.parameters, p.bandwidth, p.damping_ratio)
-    moment = guide.values @ np.array([[stiffness], [damping]]) + guide.lacking[:, None]
+    moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
     sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
     guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
@@ -114,9 +114,9 @@ class GuidingEstimate:
 
     states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
-    inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
-    used, missed : (n,), measured values so far
-    surprise : (n,), sum of the normalised innovations squared so far
+    inertia : (n,), share by which 1/I is estimated above the model's; inertia_moment : (n,), the moment (N m) to it
+    used_values, missed_values : (n,), measured values so far
+    innovation_sum : (n,), sum of the normalised innovations squared so far
     consistency : what all innovations say of the filter
     """
 
@@ -125,10 +125,10 @@ class GuidingEstimate:
     values: np.ndarray
     deviations: np.ndarray
     inertia: np.ndarray
-    lacking: np.ndarray
-    used: np.ndarray
-    missed: np.ndarray
-    surprise: np.ndarray
+    inertia_moment: np.ndarray
+    used_values: np.ndarray
+    missed_values: np.ndarray
+    innovation_sum: np.ndarray
     consistency: Consistency
 
 
@@ -178,8 +178,8 @@ def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measuremen
         deviations,
         share,
         share * moment,
-        np.cumsum(estimated.used),
-        np.cumsum(estimated.missed),
+        np.cumsum(estimated.used_values),
+        np.cumsum(estimated.missed_values),
         np.nancumsum(estimated.normalised_innovations),
         fits,
     )
@@ -220,7 +220,7 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
 
 def _check_surprise(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
     """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
-    mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
+    mean = float(guide.innovation_sum[-1] / max(guide.used_values[-1], 1))
     if mean > INNOVATION_LIMIT:
         raise InputError(
             assembly.scene.file,
@@ -235,7 +235,7 @@ def _filter_objections(p: Parameters, guide: GuidingEstimate) -> tuple[str, ...]
     """Objections to the filter that follow from its own innovations."""
     if guide.consistency.consistent:
         return ()
-    square = guide.consistency.figures[0]
+    square = guide.consistency.statistics[0]
     known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
     remedy = (
         "the stated deviations are too large: state smaller ones"
@@ -260,7 +260,7 @@ def _innovation_assumption(guide: GuidingEstimate) -> Assumption:
 
 def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
     """Position of each statistic in its interval, from -1 at the lower end to 1 at the upper one."""
-    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.figures}
+    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
@@ -269,7 +269,7 @@ def _check_bandwidth(assembly: Assembly, p: Parameters, guide: GuidingEstimate) 
     """
     if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
         return
-    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total)
+    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total_inertia)
     growth = share * float(np.sqrt(np.mean(guide.values[:, 1] ** 2)))
     if 2 * math.pi * p.bandwidth <= growth:
         raise InputError(
@@ -287,7 +287,7 @@ def _guiding_channels(
     grid = guide.period * np.arange(len(guide.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)
-        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.lacking)
+        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.inertia_moment)
     )
     latest = np.clip(np.floor(times / guide.period + 1e-6).astype(int), 0, len(grid) - 1)
     moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
@@ -299,7 +299,7 @@ def _guiding_channels(
         "pitch_deviation": ("rad", "standard deviation of the estimated pitch", pitch_deviation),
         "pitch_rate_deviation": ("rad/s", "standard deviation of its estimated rate", rate_deviation),
         "inertia_share": ("", "share by which 1/I of the chassis is estimated to exceed the scene's", inertia),
-        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used[latest]),
-        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed[latest]),
-        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.surprise[latest]),
+        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used_values[latest]),
+        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed_values[latest]),
+        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.innovation_sum[latest]),
     }

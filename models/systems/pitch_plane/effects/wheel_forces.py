@@ -75,7 +75,7 @@ def _doubts_about_forces(
         ((front,), (rear,)),
         scene.run.duration,
         IN_FILE,
-        rests=not scene.start,
+        starts_at_rest=not scene.start,
         turn=assembly.mode == "force-body",
     )
     looked = (*check(axles), *_samples((front, rear), values, period))
