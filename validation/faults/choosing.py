@@ -151,19 +151,22 @@ FAULTS = (
     CampaignFault(
         "sign of the predicted change",
         "screen of linear scenes",
-        attribute_patch(f"{LINEAR_MODULES}.screen:Screen.predicted", _other_sign),
+        attribute_patch(f"{LINEAR_MODULES}.screen:Screen.predicted_variances", _other_sign),
     ),
     CampaignFault(
         "predictions reported as confirmed",
         "choice of linear scenes",
         attribute_patch(
-            f"{LINEAR_MODULES}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted_changes(chosen)
+            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes",
+            lambda real: lambda own, chosen: own.predicted_changes(chosen),
         ),
     ),
     CampaignFault(
         "confirmed against itself",
         "choice of linear scenes",
-        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0]),
+        attribute_patch(
+            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes", lambda real: lambda own, chosen: 0.0 * own.full[0]
+        ),
     ),
     CampaignFault(
         "tolerance ignored",
@@ -198,7 +201,7 @@ FAULTS = (
         "the least change of all quantities taken for each",
         "screen by runs",
         attribute_patch(
-            f"{RUN_MODULES}.screen:Screen.shares",
+            f"{RUN_MODULES}.screen:Screen.relative_changes",
             lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()),
         ),
     ),
