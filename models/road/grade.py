@@ -44,7 +44,7 @@ class Graded:
     @property
     def finest(self) -> float:
         """Length (m) of the finest detail: the profile's, or a quarter of the transition."""
-        return min(self.profile.finest_detail, TRANSITION_LENGTH / 4.0)
+        return min(self.profile.finest, TRANSITION_LENGTH / 4.0)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""

@@ -35,7 +35,7 @@ class RoadProfile(Protocol):
         ...
 
     @property
-    def finest_detail(self) -> float:
+    def finest(self) -> float:
         """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 

@@ -27,7 +27,7 @@ class RoadUnderWheels:
     def resolution(self) -> float:
         """Time (s) in which the vehicle passes the finest detail of the road: a station spacing or a quarter of a
         wavelength."""
-        return self.profile.finest_detail / self.speed
+        return self.profile.finest / self.speed
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, 4)."""

@@ -30,7 +30,7 @@ class Sampled:
     step: float = 0.0
 
     @property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest stable step (s)."""
         return self.march.longest_stable_step
 

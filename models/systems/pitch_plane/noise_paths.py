@@ -184,7 +184,7 @@ class MujocoThreads(NoisePaths):
         times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)
         if warned:
-            yield from super().runs(paths)
+            yield from super().trajectories(paths)
             return
         for states in marched:
             try:
