@@ -18,11 +18,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docs.pages import ROOT
-from models.core.scene_effects import listing, module_of, names_of
+from models.core.scene_effects import effect_sentences, module_of, names_of
 from models.core.scene_file import SceneFile
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS
-from studies.command.asked import studies
+from studies.command.asked import study_names
 
 PAGE = ROOT / "docs" / "reference" / "scenes.md"
 HEAD = """# Scene keys
@@ -192,7 +192,10 @@ def of_system(system: str) -> list[str]:
     lines = ["", f"## {system}", "", says, "", *table(scene_model(system))]
     if SYSTEMS[system].effects:
         lines += ["", f"### Effects of {system}", "", "| effect | named by | what it adds | what it takes |"]
-        lines += ["|---|---|---|---|", *(_effect(system, name, says) for name, says in listing(system).items())]
+        lines += [
+            "|---|---|---|---|",
+            *(_effect(system, name, says) for name, says in effect_sentences(system).items()),
+        ]
     for name in names_of(system):
         model = getattr(module_of(system, name), "Parameters", None)
         if model is not None and model.model_fields:
@@ -210,7 +213,7 @@ def _effect(system: str, name: str, says: str) -> str:
 def options() -> list[str]:
     """Section of the options of studies, which a scene sets in its table [options]."""
     lines = ["", "## Options of studies", "", "A scene sets the options of its study in the table `[options]`."]
-    for name in studies():
+    for name in study_names():
         model = getattr(import_module(f"studies.{name}"), "Options", None)
         if isinstance(model, type) and issubclass(model, BaseModel):
             lines += ["", f"### Study `{name}`", "", *table(model)]

@@ -62,14 +62,14 @@ def rows(report: Path) -> str:
 
 def counts(report: Path) -> str:
     """Rows of a report per system and kind of second side in Markdown; those that were not run do not count."""
-    from validation.report.page import KINDS, evidence
+    from validation.report.page import INDEPENDENCE_TEXTS, evidence_counts
 
     lines = [
         "\n## Rows of the newest report\n",
-        "| system | " + " | ".join(KINDS) + " |",
-        "|---" * (len(KINDS) + 1) + "|",
+        "| system | " + " | ".join(INDEPENDENCE_TEXTS) + " |",
+        "|---" * (len(INDEPENDENCE_TEXTS) + 1) + "|",
     ]
-    for system, numbers in evidence(json.loads(report.read_text(encoding="utf-8"))["rows"]):
+    for system, numbers in evidence_counts(json.loads(report.read_text(encoding="utf-8"))["rows"]):
         lines.append(f"| {system} | " + " | ".join(map(str, numbers)) + " |")
     return "\n".join(lines) + "\n"
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from models.drawing.figures import LABELS
-from studies.pictures.page import Page, difference, eight_bits
+from studies.pictures.page import Page, difference_sentence, eight_bits
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing_extra, write, write_png
 
 SYSTEM = "pictures"
 Progress = Callable[[str, float], None]
-SIZE = 1280, 800
+STILL_SIZE = 1280, 800
 """Pixels of an engine's own still."""
-RUN = 0.2
+RUN_SHARE = 0.2
 """Share of the time that the runs take, for the progress bar."""
 
 
@@ -28,16 +28,16 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
     film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
     stage, motions = vehicle.filmed(film.duration, film.times(), engines)
     page = Page(stage, motions)
-    best = page.tallest()
+    best = page.frame_of_largest_force()
     written = [write_png(folder / "page.png", page.frame(best))]
     for motion in motions:
-        image = eight_bits(draw_frame(motion, stage, best, *SIZE))
+        image = eight_bits(draw_frame(motion, stage, best, *STILL_SIZE))
         written.append(write_png(folder / f"{motion.engine}.png", image))
     said = missing_extra(film.format)
     if film.format != "png" and not said:
         frames = _with_progress(page.frames(), film.frames, progress)
         written.append(write(folder / f"film.{film.format}", frames, film.frames_per_second))
-    table = [difference(motions), ", ".join(path.name for path in written), said]
+    table = [difference_sentence(motions), ", ".join(path.name for path in written), said]
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -51,7 +51,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
 def _with_progress(frames: Iterator[np.ndarray], count: int, progress: Progress) -> Iterator[np.ndarray]:
     """Yield the frames; each one advances the progress bar."""
     for k, frame in enumerate(frames):
-        progress(f"frame {k + 1} of {count}", RUN + (1.0 - RUN) * k / count)
+        progress(f"frame {k + 1} of {count}", RUN_SHARE + (1.0 - RUN_SHARE) * k / count)
         yield frame
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result, join_results
 from models.core.tables import write_table
-from models.drawing.figures import COLOURS, DARK, LABELS, heading, panels, save
+from models.drawing.figures import COLOURS, DARK, LABELS, add_heading, panels, save
 from models.systems.bicycle.run import run as run_scene
 from models.systems.bicycle.scene import BicycleScene
 
@@ -41,7 +41,7 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer(scene, runs),
+        "answer": _answer_of_run(scene, runs),
         "results": runs,
         "table": [_line(engine, result) for engine, result in runs.items()],
     }
@@ -53,7 +53,7 @@ def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
     return speeds, np.array([scene.whipple.eigenvalues(float(speed), scene.control) for speed in speeds])
 
 
-def _answer(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
+def _answer_of_run(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
     bicycle = scene.whipple
     said: dict[str, Any] = {
         "weave speed without control [m/s]": bicycle.weave_speed,
@@ -86,7 +86,7 @@ def figure(scene: BicycleScene, speeds: np.ndarray, values: np.ndarray, runs: di
             axis.plot(result.times, np.degrees(result[name]), color=COLOURS[engine], label=LABELS[engine], lw=width)
         axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} angle")
     axes[2].legend()
-    heading(drawn, scene.title, runs)
+    add_heading(drawn, scene.title, runs)
     return save(drawn, path)
 
 

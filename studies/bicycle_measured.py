@@ -13,13 +13,20 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from models.bicycle.suspects import SUSPECTS, UNITS, chosen, deviations, forecast, predicted
+from models.bicycle.suspects import (
+    SUSPECTED_PARAMETERS,
+    UNIT_OF_SUSPECT,
+    averaged_weave,
+    forecast_deviations,
+    predicted_weave,
+    ranked_suspects,
+)
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import InputError
 from models.identification.subsets import Choice
 
-FEEDBACK = Control(gain=2.0, until=6.5)
+EXPERIMENT_FEEDBACK = Control(gain=2.0, until=6.5)
 """Of the experimenters during these runs."""
 
 
@@ -29,13 +36,16 @@ class BicycleObservations:
     mean (2,) and standard deviations (2,). It is made for each speed that was not used in the choice; if all were used,
     each speed is predicted by a choice on all the others."""
 
-    seen: list[Observation]
+    observations: list[Observation]
     choice: Choice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
 
-def measured(
-    folder: str | Path, choose: Sequence[float] = (), bicycle: Whipple | None = None, base: Control = FEEDBACK
+def observed_and_predicted(
+    folder: str | Path,
+    choose: Sequence[float] = (),
+    bicycle: Whipple | None = None,
+    base: Control = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
     """Choose suspects from the measurements at the speeds ``choose`` (m/s, all by default), and predict weave at the
     other speeds; raises InputError."""
@@ -44,7 +54,7 @@ def measured(
     for speed in choose:
         if speed not in speeds:
             raise InputError(folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
-    choice = chosen(bicycle, base, [o for o in seen if not choose or o.speed in choose])
+    choice = ranked_suspects(bicycle, base, [o for o in seen if not choose or o.speed in choose])
     predictions = {}
     for observation in seen:
         if choose and observation.speed not in choose:
@@ -52,34 +62,34 @@ def measured(
         elif choose or len(seen) < 4:
             continue
         else:
-            by = chosen(bicycle, base, [o for o in seen if o is not observation])
-        mean, _ = forecast(bicycle, base, by, observation)
-        predictions[observation.speed] = mean, deviations(bicycle, base, by, observation)
+            by = ranked_suspects(bicycle, base, [o for o in seen if o is not observation])
+        mean, _ = averaged_weave(bicycle, base, by, observation)
+        predictions[observation.speed] = mean, forecast_deviations(bicycle, base, by, observation)
     return BicycleObservations(seen, choice, predictions)
 
 
-def lines(answer: BicycleObservations, bicycle: Whipple, base: Control = FEEDBACK) -> list[str]:
+def observation_lines(answer: BicycleObservations, bicycle: Whipple, base: Control = EXPERIMENT_FEEDBACK) -> list[str]:
     """Text of the measured and predicted weave."""
     told = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]
-    for seen in answer.seen:
-        mean, deviation, model = seen.mean, seen.deviation, predicted(bicycle, base, seen)
+    for seen in answer.observations:
+        mean, deviation, model = seen.mean, seen.deviation, predicted_weave(bicycle, base, seen)
         each = [
             f"{sign * mean[i]:6.2f} +- {deviation[i]:4.2f}{sign * model[i]:17.2f} ({model[i] / mean[i] - 1.0:+5.0%})"
             for i, sign in ((0, -1.0), (1, 1.0))
         ]
         told.append(f"{seen.speed:4.2f} m/s {len(seen.weave):5d}   {'    '.join(each)}")
-    choice, best = answer.choice, answer.choice.best
-    told += ["", f"best of {len(choice.fits)} subsets (inflation of chi^2: {choice.inflation:.2f}):"]
-    errors = np.sqrt(choice.inflation * np.diag(best.covariance))
+    choice, best = answer.choice, answer.choice.best_subset
+    told += ["", f"best of {len(choice.subset_fits)} subsets (inflation of chi^2: {choice.variance_inflation:.2f}):"]
+    errors = np.sqrt(choice.variance_inflation * np.diag(best.covariance))
     for name, value, error in zip(best.names, best.values, errors, strict=True):
-        told.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNITS.get(name, '')}")
+        told.append(f"  {name:<14}{value:8.3f} +- {error:.3f} {UNIT_OF_SUSPECT.get(name, '')}")
     told += ["", "suspect        weight of all subsets with it    F and p of leaving it out of the fullest"]
-    for name in SUSPECTS:
+    for name in SUSPECTED_PARAMETERS:
         calls = f"{choice.calls[name][0]:8.1f}, p = {choice.calls[name][1]:.2g}" if name in choice.calls else ""
-        why = "no measured number depends on it" if name in choice.blind else calls
+        why = "no measured number depends on it" if name in choice.undetermined_parameters else calls
         told.append(f"  {name:<14}{choice.importance(name):8.3f}{'':20}{why}")
     for name, (ratio, chance) in choice.calls.items():
-        if name not in SUSPECTS:
+        if name not in SUSPECTED_PARAMETERS:
             told.append(f"  {name:<42}{ratio:8.1f}, p = {chance:.2g}")
     for one, other, correlation in choice.hard_to_tell_apart():
         told.append(f"  {one} and {other} are hard to tell apart: their estimates correlate by {correlation:+.3f}")
@@ -101,7 +111,7 @@ def main(
     """Measure weave in recordings, and choose among the suspects."""
     try:
         whipple = load_bicycle(bicycle, file="--bicycle", place="")
-        print("\n".join(lines(measured(folder, choose or (), whipple), whipple)))
+        print("\n".join(observation_lines(observed_and_predicted(folder, choose or (), whipple), whipple)))
     except InputError as error:
         raise SystemExit(f"twinrig: {error}") from None
 

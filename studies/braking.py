@@ -11,7 +11,7 @@ from models.brake.figures_of_merit import NOT_CHECKED
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.strict import Strict, read
-from models.systems.braking.adhesion import NoAdhesion, merits
+from models.systems.braking.adhesion import NoAdhesion, figures_of_merit
 from models.systems.braking.measured_pressures import MeasuredPressures, write_pressures
 from models.systems.braking.of_scene import measured_of, plane_of
 from models.systems.braking.procedures import engines_of
@@ -61,7 +61,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         stop_figure(scene, name, results, folder / f"{name}.png", measured)
         figures, remarks = dict[str, float](), list[str]()
         try:
-            figures = merits(scene, name, stop) if options.adhesion else {}
+            figures = figures_of_merit(scene, name, stop) if options.adhesion else {}
         except NoAdhesion as error:
             remarks = [f"    {error}"]
         except RunFailed as error:
@@ -75,7 +75,12 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             **figures,
             **train,
         }
-        table += lines(name, stop, figures, wheels) + remarks + measurement_end_line(measured, stop) + compared(results)
+        table += (
+            figures_lines(name, stop, figures, wheels)
+            + remarks
+            + measurement_end_line(measured, stop)
+            + comparison_lines(results)
+        )
     told = {"failed": failed, "results": every, "answer": answer, "table": table}
     return {"scene": scene.title, "folder": str(folder), **told}
 
@@ -97,7 +102,7 @@ def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Sto
     return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
-def compared(results: dict[str, Result]) -> list[str]:
+def comparison_lines(results: dict[str, Result]) -> list[str]:
     """A line per engine: position and yaw at which the vehicle stopped, stopping time, and computing time."""
     rows = []
     for engine, result in results.items():
@@ -111,10 +116,10 @@ def compared(results: dict[str, Result]) -> list[str]:
     return rows
 
 
-def lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
+def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
     """Text for one procedure: a table of figures for the vehicle, and a table with a column per wheel."""
     rest = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
-    unfinished = "" if stop.path.stands else f": not stopped by {stop.times[-1]:g} s, {rest}"
+    unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {rest}"
     rows = [f"  {name.replace('_', ' ')}{unfinished}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.of_vehicle().items()]

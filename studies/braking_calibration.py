@@ -20,11 +20,11 @@ from models.ensemble.workers import Crew, places_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stops import Scatter, Stops, chances, scatter
+from models.systems.braking.stops import Scatter, Stops, scatter_of, statistical_errors
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
-PAPER = {
+PAPER_VALUES = {
     "deceleration": ("mean deceleration v0/T [m/s^2]", "1.36 +- 0.02", "1.37 +- 0.4", "fitted"),
     "aside": ("y-displacement [m]", "7.5 +- 0.7", "7.2 +- 0.3", "fitted"),
     "distance": ("stopping distance [m]", "44.4 +- 1.2", "44.4 +- 0.5", "compared"),
@@ -32,9 +32,9 @@ PAPER = {
     "yaw": ("final yaw [deg]", "21.3 in one run, a guessed reading", "", "compared"),
 }
 """What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
-ROUNDS = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
+QUANTITIES_OF_ROUND = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
 """What is told of every round of the fit, and its unit."""
-BLOCK = 2
+STOPS_PER_BLOCK = 2
 """Stops per block."""
 PUBLISHED_FIGURES = {"deceleration": 1.36, "aside": 7.5}
 
@@ -83,18 +83,18 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     with Crew.of(scene).at_work(options.runs, *places_of(scene)) as pool:
         for i in range(options.rounds):
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
-            means = _means(fitted(scene, options, scale, steer), options, options.runs, pool)
+            means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)
             steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
             scale *= PUBLISHED_FIGURES["deceleration"] / means["deceleration"].mean
             steer *= PUBLISHED_FIGURES["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
-        last = fitted(scene, options, scale, steer)
-        scatters = _means(last, options, options.last, pool, options.seed + 1)
-    columns = zip(ROUNDS.items(), np.array(steps).T, strict=True)
+        last = fitted_scene(scene, options, scale, steer)
+        scatters = _means_of_stops(last, options, options.last, pool, options.seed + 1)
+    columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
-    by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), chances(means), options.runs)
+    by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs)
     by_rounds.save(folder / "rounds.nc")
-    heads = (f"{name} [{unit}]" if unit else name for name, unit in ROUNDS.items())
+    heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
     stop = drive(last, procedure=options.procedure, error=scene.error)
@@ -110,7 +110,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
+def fitted_scene(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
     """The scene with another friction and steer angle; raises RunFailed if the fit has left the possible range of
     these."""
     if not (0.05 < scale < 2.0 and steer < 1.0):
@@ -120,7 +120,9 @@ def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) ->
     return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
 
 
-def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None) -> dict[str, Scatter]:
+def _means_of_stops(
+    scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None
+) -> dict[str, Scatter]:
     job = Stops(
         scene.table(),
         scene.file,
@@ -129,8 +131,8 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, blocks=Blocks(BLOCK))
-    return {key: scatter(stops[key]) for key in PAPER}
+    stops = run_paths(job, runs, executor=pool, blocks=Blocks(STOPS_PER_BLOCK))
+    return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
 def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
@@ -140,7 +142,7 @@ def table(options: Options, scale: float, steer: float, scatters: dict[str, Scat
         f"  means of {options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
-    for key, (label, simulated, measured, how) in PAPER.items():
+    for key, (label, simulated, measured, how) in PAPER_VALUES.items():
         here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
         lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")
     return lines

@@ -10,7 +10,7 @@ from pydantic import Field
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
-from models.core.told import Results, gathered
+from models.core.told import Results, joined_result
 from models.core.whole_files import write_whole
 from models.systems.braking.plan import check as check_scene
 from models.systems.braking.plan import check_reference
@@ -27,10 +27,10 @@ SHOWN_QUANTITIES = {
     "yaw [deg]": "final yaw [deg]",
     "side slip [deg]": "largest side slip [deg]",
 }
-LOCKED = "locked [s]"
+LOCKED_COLUMN = "locked [s]"
 
 
-ESTIMATED = (
+ESTIMATED_SPEED_NOTE = (
     "  true_speed = false: the speed is estimated from the wheels, which tell the vehicle's only when they "
     "come back to it; slip_pi holds them at a slip, and may lock them for seconds on ice"
 )
@@ -51,11 +51,11 @@ class Options(Strict):
     )
 
 
-LABELS = ("surface", "procedure", "controller")
+LABEL_COLUMNS = ("surface", "procedure", "controller")
 """What a run is known by."""
 
 
-def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
+def scenes_of_runs(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
     """The scene of every single run: for each surface, all procedures, each with every controller and, if there is a
     trailer, without and with it. Keys: surface, procedure, label of the controller."""
     options = read(Options, scene.options, scene.file, "options")
@@ -90,13 +90,13 @@ def _single_procedure(
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Raise InputError for options of a controller or a surface that are impossible."""
     check_reference(scene, engines)
-    for alone in cases(scene).values():
+    for alone in scenes_of_runs(scene).values():
         check_scene(alone, ("reference",))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
-    every, answer, failed, estimated = cases(scene), list[dict[str, Any]](), dict[str, str](), False
+    every, answer, failed, estimated = scenes_of_runs(scene), list[dict[str, Any]](), dict[str, str](), False
     results = dict[str, Result]()
     for i, (labels, alone) in enumerate(every.items()):
         name = ", ".join(labels)
@@ -107,21 +107,23 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         except RunFailed as error:
             failed[name] = str(error)
             continue
-        if not stop.path.stands:
+        if not stop.path.ended_at_rest:
             failed[name] = f"not stopped by {stop.times[-1]:g} s"
             continue
         values, estimated = stop.of_vehicle(), estimated or not alone.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN_QUANTITIES.items()}
-        answer.append(dict(zip(LABELS, labels, strict=True)) | shown | {LOCKED: float(stop.locks().time.max())})
-    _save(scene, answer, folder, results)
+        answer.append(
+            dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}
+        )
+    _save_stops(scene, answer, folder, results)
     _figure(scene, answer, folder / "controllers.png", results)
-    told = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED] * estimated}
+    told = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED_SPEED_NOTE] * estimated}
     return {"scene": scene.title, "folder": str(folder), "failed": failed, **told}
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
     """Table of the stops with a line per run."""
-    heads = [*SHOWN_QUANTITIES, LOCKED]
+    heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
     for stop in stops:
         labels = f"  {stop['surface']:<10}{stop['procedure'].replace('_', ' '):<12}{stop['controller']:<32}"
@@ -129,39 +131,39 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
     return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
 
-def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
+def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
     """Save the stops: a CSV line for each, and a result with an axis of stops. It holds the assumptions that any stop
     broke."""
-    heads = [*SHOWN_QUANTITIES, LOCKED] if stops else []
-    texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
+    heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN] if stops else []
+    texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABEL_COLUMNS}
     columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
     channels = {
         head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
         for head, column in columns.items()
     }
     whole = result(scene, channels, texts, engine="reference")
-    (gathered(whole, results) if results else whole).save(folder / "controllers.nc")
-    rows = [(*(stop[name] for name in LABELS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
-    write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABELS, *heads), *rows]))
+    (joined_result(whole, results) if results else whole).save(folder / "controllers.nc")
+    rows = [(*(stop[name] for name in LABEL_COLUMNS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
+    write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABEL_COLUMNS, *heads), *rows]))
 
 
-PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "final yaw angle [deg]"}
+PANEL_TITLES = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "final yaw angle [deg]"}
 
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, save, subplots
     from studies.braking_figures import plain_name
 
     options = read(Options, scene.options, scene.file, "options")
-    surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
+    surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABEL_COLUMNS)
     names, each = list(scene.procedures), len(options.controllers)
     figure, axes = subplots(
-        len(PANELS), max(len(surfaces), 1), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharey="row"
+        len(PANEL_TITLES), max(len(surfaces), 1), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharey="row"
     )
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
-        for row, (key, quantity) in enumerate(PANELS.items()):
+        for row, (key, quantity) in enumerate(PANEL_TITLES.items()):
             axis = axes[row, column]
             for k, kind in enumerate(kinds):
                 bars = {
@@ -185,7 +187,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
             )
     if stops:
         legend_below(figure, axes[0, 0], columns=max(len(kinds) // each, 1))
-    heading(figure, scene.title, results)
+    add_heading(figure, scene.title, results)
     save(figure, file)
 
 

@@ -11,21 +11,29 @@ from models.core.discretisation import of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
-from models.core.told import Results, gathered
+from models.core.told import Results, joined_result
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew, places_of
-from models.systems.braking.of_scene import merged
+from models.systems.braking.of_scene import merged_tables
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, build
-from models.systems.braking.stops import KEPT, Scatter, Stops, Welch, chances, scatter, welch
+from models.systems.braking.stops import (
+    KEPT_QUANTITIES,
+    Scatter,
+    Stops,
+    Welch,
+    scatter_of,
+    statistical_errors,
+    welch_test,
+)
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
-BLOCKS = "blocks"
+BLOCKS_FOLDER = "blocks"
 """Folder of the finished blocks, within that of the results: a killed run can be resumed."""
-BLOCK = 5
+RUNS_PER_BLOCK = 5
 """Runs per block."""
 
 
@@ -48,15 +56,15 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         raise InputError(
             scene.file, "options.procedure", options.procedure, "no such procedure", tuple(scene.procedures)
         )
-    build(merged(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
+    build(merged_tables(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Run two ensembles; saves each under its name as netCDF and CSV, and ``ensemble.png``."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
-    tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
-    ensembles, results, blocks = [], dict[str, Result](), Blocks(BLOCK)
+    tables = [scene.table(), merged_tables(scene.table(), options.other)][: 2 if options.other else 1]
+    ensembles, results, blocks = [], dict[str, Result](), Blocks(RUNS_PER_BLOCK)
     progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(each, procedure=options.procedure, error=scene.error) for each in scenes]
@@ -67,17 +75,19 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             def tell(finished: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
 
-            store = folder / BLOCKS / options.names[i]
+            store = folder / BLOCKS_FOLDER / options.names[i]
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
-    units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
-    scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]
+    units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}}
+    scatters = [{key: scatter_of(arrays[key]) for key in KEPT_QUANTITIES} for arrays in ensembles]
     for name, each, single, arrays, means in zip(options.names, scenes, singles, ensembles, scatters, strict=False):
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
-        stops = gathered(result(each, channels, {}, engine="reference"), {"one stop": single})
-        results[name] = of_chance(stops, chances(means), options.runs)
+        stops = joined_result(result(each, channels, {}, engine="reference"), {"one stop": single})
+        results[name] = of_chance(stops, statistical_errors(means), options.runs)
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
-    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in KEPT} if len(ensembles) > 1 else {}
+    tests = (
+        {key: welch_test(scatters[0][key], scatters[1][key]) for key in KEPT_QUANTITIES} if len(ensembles) > 1 else {}
+    )
     _figure(scene, options, ensembles, scatters, tests, results, folder)
     return {
         "scene": scene.title,
@@ -86,8 +96,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "results": results,
         "table": table_of(options, scatters, tests),
         "answer": {
-            "means": [{key: means[key].mean for key in KEPT} for means in scatters],
-            "p": {key: test.p for key, test in tests.items()},
+            "means": [{key: means[key].mean for key in KEPT_QUANTITIES} for means in scatters],
+            "p": {key: test.p_value for key, test in tests.items()},
         },
     }
 
@@ -100,7 +110,7 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
         + " " * 26
         + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in zip(options.names, scatters, strict=False)),
     ]
-    for key, label in KEPT.items():
+    for key, label in KEPT_QUANTITIES.items():
         parts = "".join(
             f"{figures[key].mean:>14.3f} +- {figures[key].error:<6.3f}{figures[key].deviation:>10.3f}"
             for figures in scatters
@@ -110,9 +120,9 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
         test = tests[key]
         if np.isfinite(test.t) and test.half_width > 0.0:
             lines.append(
-                f"  difference of {KEPT[key]}: {test.difference:+.3f}, 95 % interval "
+                f"  difference of {KEPT_QUANTITIES[key]}: {test.difference:+.3f}, 95 % interval "
                 f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
-                f"p = {test.p:.2g}"
+                f"p = {test.p_value:.2g}"
             )
     return lines
 
@@ -126,7 +136,7 @@ def _figure(
     results: Results,
     folder: Path,
 ) -> None:
-    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, save, subplots
 
     figure, (histogram, cloud) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
@@ -144,11 +154,11 @@ def _figure(
         lw=0.9,
         label="by the square of the speed alone",
     )
-    said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
+    said = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
     legend_below(figure, histogram, cloud, columns=2)
-    heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
+    add_heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
     save(figure, folder / "ensemble.png")
 
 

@@ -19,18 +19,18 @@ from models.drawing.figures import (
     SKY,
     SMALL_TEXT,
     VERMILION,
-    heading,
+    add_heading,
     save,
     subplot_mosaic,
 )
 from models.systems.braking.measured_pressures import MeasuredPressures
-from models.systems.braking.of_scene import plane_of, sides, vehicle_of
+from models.systems.braking.of_scene import plane_of, surfaces_of_stretch, vehicle_of
 from models.systems.braking.plan import controller_text
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import SLOWEST, Stop, wheel_names
+from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, Stop, wheel_names
 
-COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
-GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
+WHEEL_COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
+GROUND_COLOURS = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
 OTHER_SURFACE = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
 OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
@@ -48,33 +48,35 @@ def stop_figure(
     rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
     figure, axes = subplot_mosaic([*rows, ["road", "road"]], figsize=(COLUMN_WIDTH, 2.3 * (len(rows) + 1) + 0.4))
     _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured_pressures)
-    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
+    slips = np.where(stop.speed[:-1, None] > SLOWEST_SLIP_SPEED, stop.path.reports.slip, np.nan)
     _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
     _wheels(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
     if aside:
-        _angles(axes["angles"], stop)
+        _plot_angles(axes["angles"], stop)
         axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
-        _lean(axes["lean"], stop.times, lean)
+        _plot_lean(axes["lean"], stop.times, lean)
         _wheels(axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
     draw_path_from_above(axes["road"], scene, name, stop)
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     distance_text, time_text = f"{distance:.2f}\N{NO-BREAK SPACE}m", f"{time:.2f}\N{NO-BREAK SPACE}s"
-    ended = f"stands after {distance_text} and {time_text}" if stop.path.stands else f"still moves at {time_text}"
-    heading(
+    ended = (
+        f"stands after {distance_text} and {time_text}" if stop.path.ended_at_rest else f"still moves at {time_text}"
+    )
+    add_heading(
         figure,
         f"{scene.title}: {plain_name(name)} from {procedure.speed:g} m/s, "
-        f"{SPELT.get(told := controller_text(scene).replace('{procedure}', name), told)}; {ended}",
+        f"{READER_SPELLINGS.get(told := controller_text(scene).replace('{procedure}', name), told)}; {ended}",
         results,
     )
     return save(figure, file)
 
 
-SPELT = {
+READER_SPELLINGS = {
     "j_turn": "J-turn",
     "slip_bang_bang": "slip bang-bang",
     "acceleration_phases": "acceleration phases",
@@ -85,27 +87,32 @@ SPELT = {
 
 def plain_name(name: str) -> str:
     """Name of a procedure or controller with spaces or in its usual spelling, for titles and labels."""
-    return SPELT.get(name, name.replace("_", " "))
+    return READER_SPELLINGS.get(name, name.replace("_", " "))
 
 
-STRAIGHT = 0.05
+STRAIGHT_LIMIT = 0.05
 """Degrees, and m/s^2, below which a stop is called straight and its motion to the side is not drawn."""
 
 
 def _moves_aside(stop: Stop) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
-    moving = stop.speed > SLOWEST
+    moving = stop.speed > SLOWEST_SLIP_SPEED
     turned = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
-    return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
+    return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in turned)
 
 
 def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
     for i, (name, values) in enumerate(zip(wheel_names(rims.shape[1]), rims.T, strict=True)):
-        axis.plot(stop.times, values, color=COLOURS[i], lw=0.8, label=name)
+        axis.plot(stop.times, values, color=WHEEL_COLOURS[i], lw=0.8, label=name)
     if measured_pressures is not None and measured_pressures.speeds is not None:
         for i, values in enumerate(measured_pressures.speeds.T):
             axis.plot(
-                measured_pressures.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None
+                measured_pressures.times,
+                values,
+                color=WHEEL_COLOURS[i],
+                lw=1.4,
+                ls=":",
+                label="measured" if i == 0 else None,
             )
     axis.plot(stop.times, stop.speed, color=DARK, lw=1.6, label="vehicle")
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
@@ -113,24 +120,24 @@ def _speeds(axis: Axes, stop: Stop, rims: np.ndarray, measured_pressures: Measur
 
 def _wheels(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
     for i, (name, row) in enumerate(zip(wheel_names(values.shape[1]), values.T, strict=True)):
-        axis.plot(times, row, color=COLOURS[i], lw=0.8, label=name)
+        axis.plot(times, row, color=WHEEL_COLOURS[i], lw=0.8, label=name)
     axis.set(xlabel="time [s]", ylabel=label, title=title)
 
 
-def _lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
+def _plot_lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
     """Plot roll and pitch (n, 2) in rad of the body over time."""
     for values, colour, label in zip(
-        np.degrees(lean).T, COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
+        np.degrees(lean).T, WHEEL_COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
     ):
         axis.plot(times, values, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
     axis.legend(fontsize=SMALL_TEXT)
 
 
-def _angles(axis: Axes, stop: Stop) -> None:
+def _plot_angles(axis: Axes, stop: Stop) -> None:
     """Plot the yaw and side-slip angles over time and, for a train, the hitch angle."""
     axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
-    slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
+    slip = np.where(stop.speed > SLOWEST_SLIP_SPEED, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color=VERMILION, label="side slip")
     if (hitch := stop.hitch) is not None:
         axis.plot(stop.times, np.degrees(hitch), color=PINK, label="hitch")
@@ -138,19 +145,22 @@ def _angles(axis: Axes, stop: Stop) -> None:
     axis.legend(fontsize=SMALL_TEXT)
 
 
-def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
+def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
     """Outlines to draw, as unit number and corners (m, 2) in m in the unit's axes. They show truck, drawbar and
     trailer, or a vehicle on its suspension and what it tows, each with a line to its hitch."""
     truck, trailer = vehicle_of(scene), scene.trailer
-    boxes = [(0, _box(truck.front.x, truck.rear.x))]
+    boxes = [(0, _box_outline(truck.front.x, truck.rear.x))]
     if trailer is not None:
-        boxes += [(1, np.array([[trailer.drawbar, 0.0], [0.0, 0.0]])), (2, _box(trailer.front.x, trailer.rear.x))]
+        boxes += [
+            (1, np.array([[trailer.drawbar, 0.0], [0.0, 0.0]])),
+            (2, _box_outline(trailer.front.x, trailer.rear.x)),
+        ]
     if scene.vehicle.file is not None:
         plane = plane_of(scene)
         for k in range(1, plane.masses.size):
             axles = plane.place[plane.unit == k, 0]
             line = np.array([[-plane.reach[k, k], 0.0], [float(axles.max()) + OUTLINE_OVERHANG, 0.0]])
-            boxes += [(k, line), (k, _box(float(axles.max()), float(axles.min())))]
+            boxes += [(k, line), (k, _box_outline(float(axles.max()), float(axles.min())))]
     return boxes
 
 
@@ -160,7 +170,7 @@ def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plan
     return np.array([chain_point_place(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
-def _box(front: float, rear: float) -> np.ndarray:
+def _box_outline(front: float, rear: float) -> np.ndarray:
     ahead, behind = front + OUTLINE_OVERHANG, rear - OUTLINE_OVERHANG
     return np.array(
         [[ahead, HALF_WIDTH], [ahead, -HALF_WIDTH], [behind, -HALF_WIDTH], [behind, HALF_WIDTH], [ahead, HALF_WIDTH]]
@@ -171,7 +181,7 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
     """Draw the path from above on the road's surfaces, with the vehicle's outline at a few moments."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
-    plane, drawn = plane_of(scene), outlines(scene)
+    plane, drawn = plane_of(scene), unit_outlines(scene)
     behind_it = -float(plane.reach[-1, :-1].sum())
     first, last = x.min() - 6.0 - behind_it, x.max() + 6.0
     lacking = max(0.2 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
@@ -179,13 +189,13 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: Stop)
     told = set[str]()
     starts = [first] + [s.x for s in scene.road.stretches[1:]] + [last]
     for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
-        left, right = sides(scene.procedures[name], stretch)
+        left, right = surfaces_of_stretch(scene.procedures[name], stretch)
         for surface, bottom, top in ((left, scene.road.line, high), (right, low, scene.road.line)):
             axis.fill_between(
                 [max(begin, first), min(end, last)],
                 bottom,
                 top,
-                color=GROUND.get(surface, OTHER_SURFACE),
+                color=GROUND_COLOURS.get(surface, OTHER_SURFACE),
                 lw=0,
                 label=None if surface in told else surface,
             )

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, TOGETHER, Choice, Chooser
+from models.advice.choice.choose import (
+    MOST_CONFIRMATIONS,
+    PAIRS_IN_ADVANCE,
+    PREDICTION_SHARE,
+    RUN_BUDGET,
+    Choice,
+    Chooser,
+)
 from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
 from models.core.result import Result
@@ -19,11 +26,11 @@ from models.ensemble.workers import Crew, places_of
 from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
 
 SYSTEM = ANY_SYSTEM
-ACTIVE, IDLE = 0.1, 1e-3
+ACTIVE_SHARE, BLIND_CHANGE = 0.1, 1e-3
 """Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
-LOWEST, HIGHEST = 1e-3, 1e3
+LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
 """Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
-ELEMENTS = 8
+ELEMENTS_DRAWN = 8
 """Elements whose activity is drawn, the most active first."""
 Progress = Callable[[str, float], None]
 
@@ -37,30 +44,31 @@ class Options(Strict):
 @dataclass(frozen=True)
 class SingleEffect:
     """One effect alone: the predicted changes (quantities,) if only it is left out (inf if it cannot be), and its
-    saving. saved: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
+    saving. work_ratio: ratio of the work of the scene, at steps lengthened for accuracy alone, to the work without the
     effect at the longest step then allowed."""
 
     effect: str
     changes: np.ndarray
-    saved: float
+    work_ratio: float
 
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """The choice of effects for one scene, with each effect taken alone. further: tolerances above which effects that
-    stay would be left out too. watts: energy activity (W) by element, where it has a closed form. results: runs of the
-    reduced scene, with their errors."""
+    """The choice of effects for one scene, with each effect taken alone. further_tolerances: tolerances above which
+    effects that stay would be left out too. activity_of_element: energy activity (W) by element, where it has a closed
+    form.
+    results: runs of the reduced scene, with their errors."""
 
     scene: Any
     engine: str
     choice: Choice
-    alone: list[SingleEffect]
-    further: dict[str, float]
-    watts: dict[str, float]
+    single_effects: list[SingleEffect]
+    further_tolerances: dict[str, float]
+    activity_of_element: dict[str, float]
     results: list[Result] = field(default_factory=list)
 
     @property
-    def stay(self) -> list[str]:
+    def staying_effects(self) -> list[str]:
         """Effects that were not left out."""
         return [name for name in self.choice.candidates if name not in self.choice.left_out]
 
@@ -88,17 +96,17 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
         progress(each.title, i / len(scenes))
         linear, asked = has_closed_form(each), engines if each is scene else ()
         plan_of(each).check(each, () if linear else (engine_of(each, asked),))
-        said = partial(_pass_progress, progress, f"{each.title}, of at most {RUNS} runs", i, len(scenes))
-        choices.append(_linear(each) if linear else chosen(each, asked, said))
-        _save(choices[-1], folder / f"{i + 1}_{each.system.replace('-', '_')}.csv")
+        said = partial(_pass_progress, progress, f"{each.title}, of at most {RUN_BUDGET} runs", i, len(scenes))
+        choices.append(_linear_ride_choice(each) if linear else choice_of_scene(each, asked, said))
+        _save_effect_table(choices[-1], folder / f"{i + 1}_{each.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
     choice_figure(choices, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": [_answer(choice) for choice in choices],
-        "table": [line for choice in choices for line in lines(choice, len(choices) > 1)],
+        "answer": [_answer_of_choice(choice) for choice in choices],
+        "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
         "results": _results(choices),
     }
 
@@ -153,29 +161,35 @@ def search_text(scene: Any) -> str:
         )
     runs = Variants(scene, engine_of(scene, ()))
     return (
-        f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUNS} runs of the "
-        f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {ROUNDS} sets at most"
+        f"  choice     among {len(runs.effects)} effects; the search ends at the calls of {RUN_BUDGET} runs of the "
+        f"scene, of {runs.system.steps(runs.scene):,} steps each, and confirms {MOST_CONFIRMATIONS} sets at most"
     )
 
 
-def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> SceneChoice:
+def choice_of_scene(
+    scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
+) -> SceneChoice:
     """The choice for a scene in one engine."""
     engine = engine_of(scene, engines)
-    with Crew.of(scene, usual=1).at_work(TOGETHER, *places_of(scene)) as pool:
+    with Crew.of(scene, usual=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
-        SingleEffect(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))
+        SingleEffect(
+            effect, chooser.teller.predicted_change(frozenset([effect])), none / chooser.work(frozenset([effect]))
+        )
         for effect in chooser.effects
     ]
-    return SceneChoice(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
+    return SceneChoice(
+        scene, engine, choice, alone, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
+    )
 
 
-def _linear(scene: Any) -> SceneChoice:
+def _linear_ride_choice(scene: Any) -> SceneChoice:
     """The choice for a linear stationary ride scene by its closed form; numbers of calls are for one second of
     motion."""
-    from models.advice.ride_choice.activity import activity
+    from models.advice.ride_choice.activity import activity_by_element
     from models.advice.ride_choice.choose import Chooser as Linear
     from models.systems.ride.of_scene import scene_errors
 
@@ -185,104 +199,117 @@ def _linear(scene: Any) -> SceneChoice:
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
         alone = [
-            SingleEffect(effect.name, abs(chooser.predicted(each)), calls / chooser.cost(each).calls)
+            SingleEffect(effect.name, abs(chooser.predicted_changes(each)), calls / chooser.cost(each).calls)
             for effect, each in singles.items()
         ]
-        further = {effect.name: change for effect, change in chooser.further(frozenset(linear.left_out)).items()}
-        watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
-    before, after = round(linear.before.calls), round(linear.after.calls)
-    work = tuple(cost.work for cost in (linear.before, linear.before, linear.after))
+        further = {
+            effect.name: change for effect, change in chooser.change_if_left_out_too(frozenset(linear.left_out)).items()
+        }
+        watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
+    before, after = round(linear.cost_before.calls), round(linear.cost_after.calls)
+    work = tuple(cost.work for cost in (linear.cost_before, linear.cost_before, linear.cost_after))
     choice = Choice(
         tuple(each.name for each in linear.candidates),
         tuple(each.name for each in linear.left_out),
         1,
-        abs(linear.predicted),
-        0.0 * linear.predicted,
-        abs(linear.confirmed),
-        0.0 * linear.predicted,
+        abs(linear.predicted_change),
+        0.0 * linear.predicted_change,
+        abs(linear.confirmed_change),
+        0.0 * linear.predicted_change,
         linear.within_tolerance,
         (before, before, after),
         work,
-        linear.rounds,
+        linear.confirmations,
         0,
         0.0,
     )
     return SceneChoice(scene, "closed form", choice, alone, further, watts)
 
 
-def _answer(answered: SceneChoice) -> dict[str, Any]:
+def _answer_of_choice(answered: SceneChoice) -> dict[str, Any]:
     """Saved answer of a choice: its effects, their changes and the saving."""
     choice = answered.choice
     return {
         "system": answered.scene.system,
         "implementation": answered.engine,
         "left out": list(choice.left_out),
-        "stay": answered.stay,
+        "stay": answered.staying_effects,
         "step times": choice.times,
         "errors": {
-            name: {part: float(getattr(choice, part)[i]) for part in ("predicted", "confirmed", "chance")}
+            name: {
+                "predicted": float(choice.predicted_change[i]),
+                "confirmed": float(choice.confirmed_change[i]),
+                "chance": float(choice.statistical_error[i]),
+            }
             for i, name in enumerate(answered.scene.quantities)
         },
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
-        "confirmations": choice.rounds,
-        "would matter no more above": answered.further,
+        "confirmations": choice.confirmations,
+        "would matter no more above": answered.further_tolerances,
         "would break an assumption": {
-            name: [asdict(each) for each in barred] for name, barred in choice.barred.items()
+            name: [asdict(each) for each in barred] for name, barred in choice.assumptions_barring.items()
         },
     }
 
 
-def _save(choice: SceneChoice, path: Path) -> None:
+def _save_effect_table(choice: SceneChoice, path: Path) -> None:
     """Save a CSV file with a row per effect: the changes if it alone is left out, what this saves, and whether it was
     left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
-        for effect in choice.alone:
+        for effect in choice.single_effects:
             values = map(repr, effect.changes.tolist())
-            broken = "; ".join(each.says for each in choice.choice.barred.get(effect.effect, ()))
+            broken = "; ".join(each.says for each in choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
-                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.saved), broken]
+                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.work_ratio), broken]
             )
 
 
-def percent(value: float) -> str:
+def percent_text(value: float) -> str:
     """A relative change as text."""
     digits = ".2g" if abs(value) < 0.1 else ",.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
 
 
 def _change_text(change: float, beside: float) -> str:
-    return percent(change) + (f" +- {percent(beside)}" if beside else "")
+    return percent_text(change) + (f" +- {percent_text(beside)}" if beside else "")
 
 
 def _why_it_stays(change: float, scene_choice: SceneChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out as well."""
-    if change > BUDGET * scene_choice.scene.tolerance or scene_choice.watts or scene_choice.choice.ended:
-        return f"would matter no more at a tolerance above {percent(change)}"
-    return f"stays at {percent(change)}: steps would have to be shorter for it to go, or whole runs did not confirm it"
+    if (
+        change > PREDICTION_SHARE * scene_choice.scene.tolerance
+        or scene_choice.activity_of_element
+        or scene_choice.choice.ended_early
+    ):
+        return f"would matter no more at a tolerance above {percent_text(change)}"
+    return (
+        f"stays at {percent_text(change)}: steps would have to be shorter for it to go, or whole runs did "
+        "not confirm it"
+    )
 
 
-def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
+def choice_lines(scene_choice: SceneChoice, named: bool) -> list[str]:
     """Text of the choice."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
         f"  {scene.title} ({scene.system}, {scene_choice.engine})" if named else f"  by {scene_choice.engine}",
         f"    left out: {', '.join(choice.left_out) or 'nothing'}",
-        f"    stay: {', '.join(scene_choice.stay) or 'nothing'}",
+        f"    stay: {', '.join(scene_choice.staying_effects) or 'nothing'}",
     ]
     for i, name in enumerate(scene.quantities):
-        kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
+        kept = "kept" if choice.confirmed_change[i] + choice.statistical_error[i] <= scene.tolerance else "NOT KEPT"
         rows.append(
-            f"    {name}: {_change_text(choice.predicted[i], choice.remainder[i])} predicted, "
-            f"{_change_text(choice.confirmed[i], choice.chance[i])} confirmed, tolerance "
+            f"    {name}: {_change_text(choice.predicted_change[i], choice.prediction_remainder[i])} predicted, "
+            f"{_change_text(choice.confirmed_change[i], choice.statistical_error[i])} confirmed, tolerance "
             f"{100 * scene.tolerance:g} %: {kept}"
         )
     before, step, after = choice.calls
     saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
-    if scene_choice.watts:
+    if scene_choice.activity_of_element:
         rows.append(f"    calls per second of motion {saved}")
     else:
         faster = choice.seconds[0] / choice.seconds[2]
@@ -292,66 +319,75 @@ def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
         )
     rows += [
         f"    {name} {_why_it_stays(change, scene_choice)}"
-        for name, change in sorted(scene_choice.further.items(), key=lambda item: item[1])
+        for name, change in sorted(scene_choice.further_tolerances.items(), key=lambda item: item[1])
     ]
     rows += [
         f"    {name} stays; without it an assumption would be broken: {each.fact()}"
-        for name, breaches in choice.barred.items()
+        for name, breaches in choice.assumptions_barring.items()
         for each in breaches
     ]
-    if choice.ended:
-        rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
-    if choice.more:
-        rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
+    if choice.ended_early:
+        rows.append(f"    the search ended at the calls of {RUN_BUDGET} runs of the scene: larger sets were not tried")
+    if choice.sample_factor:
+        rows.append(
+            f"    chance alone stands in the way of more: {choice.sample_factor:.2g} times as many samples would tell"
+        )
     rows += misleading_activities(scene_choice)
-    worst = float((choice.confirmed + choice.chance).max())
-    return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
+    worst = float((choice.confirmed_change + choice.statistical_error).max())
+    return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
 def misleading_activities(choice_of: SceneChoice) -> list[str]:
     """Sentences on inertias for which energy activity misleads: they are active, but leaving them out hardly changes a
     quantity."""
-    total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
-    for effect in choice_of.alone:
-        share = choice_of.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
+    total, rows = sum(value for value in choice_of.activity_of_element.values() if np.isfinite(value)), []
+    for effect in choice_of.single_effects:
+        share = choice_of.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
         for name, change in zip(choice_of.scene.quantities, effect.changes, strict=True):
-            if np.isfinite(share) and share > ACTIVE and change < IDLE:
+            if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
                 rows.append(
-                    f"    energy activity misleads: {effect.effect} holds {percent(share)} of it, and without "
-                    f"it {name} changes by {percent(change)}"
+                    f"    energy activity misleads: {effect.effect} holds {percent_text(share)} of it, and without "
+                    f"it {name} changes by {percent_text(change)}"
                 )
     return rows
 
 
 def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     """Figure with a panel per scene, and another panel for energy activities if there are any."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, save, subplots
 
-    shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
-    heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(choice.alone), 4)) for choice, active in shown]
+    shown = [(choice, False) for choice in choices] + [
+        (choice, True) for choice in choices if choice.activity_of_element
+    ]
+    heights = [
+        1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.single_effects), 4)) for choice, active in shown
+    ]
     figure, axes = subplots(
         len(shown), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.5), squeeze=False, height_ratios=heights
     )
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
-        _activity(axis, choice) if active else _changes(axis, choice)
+        _plot_activity(axis, choice) if active else _plot_changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    heading(figure, title, _results(choices))
+    add_heading(figure, title, _results(choices))
     save(figure, path)
 
 
-def _changes(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     """Plot how much each quantity changes if each effect alone is left out.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
-    from models.drawing.figures import BAD, DARK, PALE, SMALL_TEXT
+    from models.drawing.figures import DARK, PALE, REJECTED_COLOUR, SMALL_TEXT
 
-    shown = sorted(scene_choice.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
+    shown = sorted(
+        scene_choice.single_effects,
+        key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST_CHANGE).max()),
+    )
     y = np.arange(len(shown))
     for i, name in enumerate(scene_choice.scene.quantities):
         values = np.array([effect.changes[i] for effect in shown])
         axis.plot(
-            np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST, HIGHEST),
+            np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST_CHANGE, HIGHEST_CHANGE),
             y,
             "os^Dv"[i % 5],
             color=f"C{i}",
@@ -360,16 +396,20 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
         )
     for row, effect in zip(y, shown, strict=True):
         if not np.isfinite(effect.changes).all():
-            axis.text(HIGHEST, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
-    barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.barred]
+            axis.text(HIGHEST_CHANGE, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
+    barred = [
+        row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.assumptions_barring
+    ]
     if barred:
-        place = np.full(len(barred), HIGHEST)
-        axis.plot(place, barred, "x", color=BAD, ms=7, mew=1.6, label="would break an assumption")
+        place = np.full(len(barred), HIGHEST_CHANGE)
+        axis.plot(place, barred, "x", color=REJECTED_COLOUR, ms=7, mew=1.6, label="would break an assumption")
     axis.axvline(100 * scene_choice.scene.tolerance, color=DARK, ls="--", lw=1, label="tolerance")
-    axis.axvspan(100 * scene_choice.scene.tolerance, 1.5 * HIGHEST, color=PALE, alpha=0.25, lw=0, label="matters alone")
+    axis.axvspan(
+        100 * scene_choice.scene.tolerance, 1.5 * HIGHEST_CHANGE, color=PALE, alpha=0.25, lw=0, label="matters alone"
+    )
     axis.set(
         xscale="log",
-        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        xlim=(LOWEST_CHANGE / 1.5, HIGHEST_CHANGE * 1.5),
         ylim=(-0.5, len(shown) - 0.5),
         yticks=y,
         yticklabels=[_effect_and_whether_gone(scene_choice, effect) for effect in shown],
@@ -391,12 +431,12 @@ def _effect_and_whether_gone(choice_of: SceneChoice, effect: SingleEffect) -> st
     )
 
 
-def _activity(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_activity(axis: Any, scene_choice: SceneChoice) -> None:
     from models.drawing.figures import BLUE
 
-    finite = {name: value for name, value in scene_choice.watts.items() if np.isfinite(value)}
+    finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}
     total = sum(finite.values())
-    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     axis.set(
         title=f"{scene_choice.scene.system}: energy activity, which knows neither the question nor pairs",

@@ -19,7 +19,6 @@ from models.core.whole_files import reason_of
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
-    causes,
     check_by_any,
     checked_study,
     engines_of,
@@ -27,6 +26,7 @@ from studies.command.asked import (
     load_scene,
     plain_arrays,
     plan_of,
+    query_lines,
 )
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import given_crew
@@ -45,7 +45,7 @@ from studies.command.options import (
     Workers,
 )
 from studies.command.second_compiler import compiled_beside
-from studies.command.waiting import waiting
+from studies.command.waiting import progress_bar
 
 app = typer.Typer(
     add_completion=False,
@@ -121,13 +121,13 @@ def show(
     if not price:
         check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
         plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search(loaded)]))
+        return print("\n".join([plan, *untold_findings(findings_of(loaded), plan), *_search_lines(loaded)]))
     _say_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
-    from models.advice.price.effects_text import lines as price_lines
+    from models.advice.price.effects_text import price_list_lines as price_lines
 
-    with waiting("short runs with and without each effect", loaded.system):
+    with progress_bar("short runs with and without each effect", loaded.system):
         prices = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
     print(json.dumps(as_dict(prices), indent=1) if as_json else "\n".join(price_lines(prices, loaded.quantities)))
 
@@ -139,7 +139,7 @@ def _say_user_code(scene: Any) -> None:
         print(f"twinrig: this runs your own code, many times: [port] {code}", file=sys.stderr, flush=True)
 
 
-def _search(scene: Any) -> list[str]:
+def _search_lines(scene: Any) -> list[str]:
     """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
     from studies.choice import search_text
 
@@ -165,19 +165,19 @@ def run_scene(
     telling = profile_lines(profile)
     if sweep is not None:
         from studies.command.crew import crew_of
-        from studies.command.sweep import RECORDS, points
+        from studies.command.sweep import RECORDS_FOLDER, sweep_points
         from studies.command.sweep import run as run_points
 
-        job = points(sweep, scene, changes or (), engine, not no_error)
+        job = sweep_points(sweep, scene, changes or (), engine, not no_error)
         crew = crew_of(job.check(), workers, cluster)
-        folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
+        folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
         work = partial(run_points, replace(job, folder=folder), crew=crew)
         return finish(telling(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error, **given_crew(workers, cluster)})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
-    with _queried(loaded), compiled_beside(scene, changes or [], loaded, engines):
-        with waiting("checking the scene", loaded.system):
+    with _telling_queries(loaded), compiled_beside(scene, changes or [], loaded, engines):
+        with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
         if plain_arrays(loaded, engines, module):
             leave_out(*OF_LABELS)
@@ -188,12 +188,12 @@ def run_scene(
 
 
 @contextmanager
-def _queried(scene: Any) -> Iterator[None]:
+def _telling_queries(scene: Any) -> Iterator[None]:
     """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
     try:
         yield
     except InputError:
-        for line in causes(scene):
+        for line in query_lines(scene):
             print(line, file=sys.stderr)
         raise
 
@@ -215,11 +215,11 @@ def price(
     """
     from models.advice.price.recommendation import price as price_of
     from models.advice.price.text import as_dict
-    from models.advice.price.text import lines as price_lines
+    from models.advice.price.text import recommendation_lines as price_lines
 
     loaded = load_scene(scene, changes).model_copy(update=given_crew(workers, cluster))
     _say_user_code(loaded)
-    with waiting("runs of every engine in ever finer steps", loaded.system):
+    with progress_bar("runs of every engine in ever finer steps", loaded.system):
         priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
     print(json.dumps(as_dict(priced), indent=1) if as_json else "\n".join(price_lines(priced)))
     if not priced.winners:
@@ -247,9 +247,9 @@ def compare(
     from studies.command.comparison import compare as differences
     from studies.command.comparison import report
 
-    if measured.against(first, second):
+    if measured.is_run_against_measurement(first, second):
         for run in measured.saved_results(first).values():
-            measured.overlay(run, second, shift)  # before a folder is made
+            measured.overlay_of_run(run, second, shift)  # before a folder is made
         folder = folder_of("compare", None, "", out, None)
         return finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
     if shift is not None:
@@ -277,7 +277,7 @@ def identify(
     as_json: AsJson = False,
 ) -> None:
     """Identify numbers of a scene from a measurement, with standard errors, and say what it does not determine."""
-    from studies.command.identify import STAGES, report
+    from studies.command.identify import STAGES_FOLDER, report
 
     loaded, keys = load_scene(scene, changes), [key.strip() for key in parameters.split(",") if key.strip()]
     if not keys:
@@ -287,7 +287,7 @@ def identify(
     checked_study(loaded, engines)
     if not measurement.is_file():
         raise InputError(measurement, "--from", None, "no such file")
-    folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES, "", out, resume)
+    folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES_FOLDER, "", out, resume)
     usual = engines[0] if engines else ""
 
     def computed(tell: Callable[[str, float], None]) -> dict[str, Any]:
@@ -309,10 +309,10 @@ def export(
     twinrig, such as tyres, stay behind; the file and the terminal name each of them.
     """
     from studies.command.export import export as write
-    from studies.command.export import lines as written
+    from studies.command.export import export_lines as written
 
     loaded = load_scene(scene, changes)
-    with waiting("building the vehicle", loaded.system):
+    with progress_bar("building the vehicle", loaded.system):
         told = write(loaded, engine, out)
     print("\n".join(written(loaded.title, told)))
 
@@ -339,12 +339,12 @@ def twin(
     The file as MuJoCo parsed it is held to the same model built in Exudyn, in MuJoCo and by plain equations, at random
     states. Of two files the elements that make them move differently are named. Ends with code 1 if anything differs.
     """
-    from studies.command.twin import Wanted, check_asked, examine, kinds, lines
+    from studies.command.twin import TwinOptions, check_asked, content_kinds, examine, twin_lines
 
     check_asked(files, page)
-    with waiting("building the model") as tell:
-        twins = examine(files, kinds(without), Wanted(states, march, tolerance, quantity, controls), tell)
-    print("\n".join(lines(twins)))
+    with progress_bar("building the model") as tell:
+        twins = examine(files, content_kinds(without), TwinOptions(states, march, tolerance, quantity, controls), tell)
+    print("\n".join(twin_lines(twins)))
     if page is not None:
         from studies.twin_page import write
 

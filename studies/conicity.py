@@ -21,7 +21,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     conicities = conicity.run(scene, lambda share: progress("rolling radii", 0.9 * share))
     conicity.refuse_without_wave(scene, conicities.detail)
     conicities.save(folder / "conicity.nc")
-    conicities.save_table(folder / "conicity.csv", "amplitude", *conicity.CHANNELS)
+    conicities.save_table(folder / "conicity.csv", "amplitude", *conicity.CONICITY_CHANNELS)
     conicities.detail.save_table(folder / "rolling_radii.csv")
     conicity_figure(conicities, scene.title, folder / "conicity.png")
     return {
@@ -30,7 +30,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "failed": {},
         "answer": conicity.conicity_numbers(conicities),
         "results": {"conicity": conicities},
-        "table": conicity.lines(conicities.detail),
+        "table": conicity.conicity_lines(conicities.detail),
     }
 
 

@@ -16,12 +16,12 @@ from models.core.result import Result
 from models.core.strict import Strict, read
 from models.machine.seconds import cost, duration
 from models.systems import run as run_scene
-from models.systems.contact.run import Rolls, cells_of, scene_contact, touches
+from models.systems.contact.run import ContactResults, cells_of, scene_contact, touching_places
 from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
-ROWS = 12
+ROWS_PRINTED = 12
 """Rows of a sweep that are printed, about; the file has all."""
 
 
@@ -42,13 +42,13 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     """Press the bodies, roll them; saves forces and fields as CSV and netCDF, and figures."""
     check(scene, engines)
     forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
-    rolls: Rolls = forces.detail
+    rolls: ContactResults = forces.detail
     for name, saved in (("forces", forces), ("fields", cells_of(scene, rolls))):
         if saved is not None:
             saved.save(folder / f"{name}.nc")
             saved.save_table(folder / f"{name}.csv")
     progress("figures", 0.9)
-    _figures(scene, forces, folder)
+    _draw_figures(scene, forces, folder)
     body, doubts = rolls.contact, json.loads(forces.data.attrs["doubts"])
     rows = forces.data.to_dataframe().to_dict("records")
     answer = asdict(body.pressing) | {"friction": body.friction, "forces": rows, "doubt": "".join(doubts)}
@@ -65,7 +65,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 def _table(scene: ContactScene, forces: Result) -> list[str]:
     """Lines on the normal contact, then forces with their errors: all for a single creepage, or some rows of a
     sweep."""
-    rolls: Rolls = forces.detail
+    rolls: ContactResults = forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
@@ -75,30 +75,30 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
         *_lines_of_touches(scene),
         f"  pressed in {duration(rolls.pressing)} once, rolled in {cost(rolls.rolling)} at each creepage"
         + ", errors included" * bool(rolls.errors),
-        f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
+        f"  forces on the wheel by {theory_text(scene.method)}; mu N = {limit:,.0f} N",
         f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
         f"{'stick':>7}{'loss [N]':>10}"
         + "   errors: of cells, of theory [% of mu N], of Mz [N m]"
         * bool(rolls.errors),
     ]
-    step = max(1, (len(rolls.motions) - 1) // ROWS)
+    step = max(1, (len(rolls.motions) - 1) // ROWS_PRINTED)
     errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"
             f"{round(force.fy):>10,}{force.mz:>10.3f}{force.stick:>7.0%}{force.dissipation:>10.3g}"
-            + ("" if error is None else _errors(error, limit))
+            + ("" if error is None else _errors_text(error, limit))
         )
     loss = "  loss: power by the rolling speed"
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors(error: Error, limit: float) -> str:
-    cells, theory = (_percent(part, limit) for part in (error.cells, error.theory))
+def _errors_text(error: Error, limit: float) -> str:
+    cells, theory = (_percent_text(part, limit) for part in (error.cells, error.theory))
     return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
 
 
-NAMES = {
+THEORY_NAMES = {
     "fastsim": "FASTSIM",
     "linear": "the linear theory",
     "simplified": "the theory of 1983",
@@ -106,12 +106,12 @@ NAMES = {
 }
 
 
-def theory(method: Method) -> str:
+def theory_text(method: Method) -> str:
     """Name of the contact theory, with its number of cells along each axis where it has cells."""
-    return NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
+    return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
-def _percent(error: float, limit: float) -> str:
+def _percent_text(error: float, limit: float) -> str:
     return f"{100 * error / limit:.2f}" if limit > 0 else "0"
 
 
@@ -122,35 +122,35 @@ def _lines_of_touches(scene: ContactScene) -> list[str]:
     return [
         f"  touches at {1e3 * touch.rail_y:.2f} mm from the rail's top and {1e3 * touch.wheel_y:.2f} mm from the "
         f"taping line, {touch.angle:.4f} rad steep, gap {round(1e6 * touch.gap, 1) + 0.0:.1f} um"
-        for touch in touches(scene, scene_contact(scene))
+        for touch in touching_places(scene, scene_contact(scene))
     ]
 
 
-def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
+def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
     from studies.contact_figures import contact_figure, sweep_figure
 
-    rolls: Rolls = forces.detail
+    rolls: ContactResults = forces.detail
     motion, last, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
     if last.fields:
         title = (
             f"{scene.title}\n"
             f"ξx = {motion[0]:.3g}, ξy = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m\n"
             f"Fx = {1e-3 * last.fx:.2f} kN, Fy = {1e-3 * last.fy:.2f} kN, Mz = {last.mz:.1f} N m "
-            f"by {NAMES[scene.method.name]}"
+            f"by {THEORY_NAMES[scene.method.name]}"
         )
         friction = rolls.contact.friction
         contact_figure(list(last.fields), friction, title, _pressure(rolls.contact), forces, folder / "contact.png")
     if sweep is not None:
         others = "".join(
             f"; {symbol} = {value:.3g}{unit}"
-            for (symbol, unit), (name, value) in zip(SYMBOLS, scene.creepage, strict=True)
+            for (symbol, unit), (name, value) in zip(CREEPAGE_SYMBOLS, scene.creepage, strict=True)
             if value and name != sweep.of
         )
-        title = f"{scene.title}\nForces by {theory(scene.method)}{others}"
-        sweep_figure(sweep, forces, _checks(scene, rolls), title, folder / "forces.png")
+        title = f"{scene.title}\nForces by {theory_text(scene.method)}{others}"
+        sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, folder / "forces.png")
 
 
-SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
+CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
 def _pressure(body: RollingContact) -> str:
@@ -164,7 +164,7 @@ CHECKING_CELLS = 40
 """Cells along each axis of the exact theory where it checks a sweep."""
 
 
-def _checks(scene: ContactScene, rolls: Rolls) -> dict[int, Any]:
+def _exact_checks(scene: ContactScene, rolls: ContactResults) -> dict[int, Any]:
     """Results of the exact theory, keyed by the motion's number, at a few motions of a sweep. Empty if the contact is
     not a Hertzian ellipse, is exact already, or has falling friction."""
     body, points = rolls.contact, read(Options, scene.options, scene.file, "options").exact

@@ -23,17 +23,17 @@ from models.drawing.figures import (
     PINK,
     SKY,
     VERMILION,
-    heading,
+    add_heading,
     legend_below,
     save,
     subplots,
 )
 from models.systems.contact.scene import Sweep
-from models.systems.contact.work_precision import TARGETS, TheoryPoint
+from models.systems.contact.work_precision import ERROR_TARGETS, TheoryPoint
 
-MILLI, MEGA = 1e3, 1e-6
-STICK, SLIP = "#cfe3f2", "#f6c9a8"
-ARROWS = 17
+MILLIMETRES_PER_METRE, MEGAPASCAL_PER_PASCAL = 1e3, 1e-6
+STICK_COLOUR, SLIP_COLOUR = "#cfe3f2", "#f6c9a8"
+ARROW_COUNT = 17
 """Arrows across the longer side of a contact area, about."""
 
 
@@ -45,33 +45,39 @@ def contact_figure(
 
     forces : the result whose last motion is shown.
     """
-    length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
+    length, width = (
+        MILLIMETRES_PER_METRE * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy"
+    )
     size = COLUMN_WIDTH, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
     figure, axes = subplots(1, 2, figsize=size, sharex=True, sharey=True)
     _pressure(axes[0], patches, pressure)
-    _tractions(axes[1], patches, friction, max(length, width) / ARROWS)
+    _draw_tractions(axes[1], patches, friction, max(length, width) / ARROW_COUNT)
     for axis in axes:
         axis.set(aspect="equal", xlabel="x, direction of rolling [mm]")
         axis.grid(visible=False)
     for axis in axes:
         axis.set_ylabel("y, to the right [mm]")
     axes[0].invert_yaxis()  # as seen from above, where x is ahead
-    heading(figure, title, {"forces": forces})
+    add_heading(figure, title, {"forces": forces})
     save(figure, path)
 
 
-def _rectangles(f: Fields) -> list[Array]:
+def _cell_corners(f: Fields) -> list[Array]:
     """Corners of every cell inside, (4, 2) in mm."""
-    x, y, dx, dy = (MILLI * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
+    x, y, dx, dy = (MILLIMETRES_PER_METRE * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
     corners = [(x + i * dx / 2, y + j * dy / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return list(np.array(corners).transpose(2, 0, 1))
 
 
 def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
-    greatest = MEGA * max(float(f.pressure.max()) for f in patches)
+    greatest = MEGAPASCAL_PER_PASCAL * max(float(f.pressure.max()) for f in patches)
     for f in patches:
         cells = PolyCollection(
-            _rectangles(f), array=MEGA * f.pressure[f.inside], cmap="viridis", edgecolor="face", linewidth=0.2
+            _cell_corners(f),
+            array=MEGAPASCAL_PER_PASCAL * f.pressure[f.inside],
+            cmap="viridis",
+            edgecolor="face",
+            linewidth=0.2,
         )
         cells.set_clim(0.0, greatest)
         axis.add_collection(cells)
@@ -80,17 +86,19 @@ def _pressure(axis: Any, patches: list[Fields], quantity: str) -> None:
     axis.set_title(f"{quantity[0].upper()}{quantity[1:]},\nlargest {greatest:,.0f} MPa")
 
 
-def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
+def _draw_tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
     """Draw the zones of stick and slip, and arrows of the traction on the wheel every ``spacing`` (mm)."""
     largest = friction * max(float(f.pressure.max()) for f in patches)
     scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
     for f in patches:
-        colours = np.where(f.slips[f.inside], SLIP, STICK)
-        axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
-        x, y, px, py = _arrows(f, spacing / MILLI)
-        arrows = axis.quiver(MILLI * x, MILLI * y, px, py, **scaled, width=0.004, color=DARK)
-    axis.quiverkey(arrows, 0.9, 1.03, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
-    marks = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
+        colours = np.where(f.slips[f.inside], SLIP_COLOUR, STICK_COLOUR)
+        axis.add_collection(PolyCollection(_cell_corners(f), facecolor=colours, edgecolor="face", linewidth=0.2))
+        x, y, px, py = _arrow_data(f, spacing / MILLIMETRES_PER_METRE)
+        arrows = axis.quiver(
+            MILLIMETRES_PER_METRE * x, MILLIMETRES_PER_METRE * y, px, py, **scaled, width=0.004, color=DARK
+        )
+    axis.quiverkey(arrows, 0.9, 1.03, largest, f"{MEGAPASCAL_PER_PASCAL * largest:,.0f} MPa", labelpos="W")
+    marks = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK_COLOUR, SLIP_COLOUR)]
     area = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
     slip = float(area[np.concatenate([f.slips[f.inside] for f in patches])].sum() / area.sum())
     labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
@@ -98,7 +106,7 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
-def _arrows(f: Fields, spacing: float) -> Array:
+def _arrow_data(f: Fields, spacing: float) -> Array:
     """Positions and tractions (4, n) at evenly spaced points, which lie in some rows of cells and are interpolated
     along them."""
     arrows, lines = list[Array](), f.y[:, 0]
@@ -114,8 +122,8 @@ def _arrows(f: Fields, spacing: float) -> Array:
     return np.concatenate(arrows, axis=1)
 
 
-LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepage [%]", "spin": "spin [1/m]"}
-COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
+CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepage [%]", "spin": "spin [1/m]"}
+FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
 def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
@@ -134,7 +142,7 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         (left, "fy", "Fy", 1e-3, error, limit),
         (right, "mz", None, 1.0, turned, np.inf),
     ):
-        colour, force = COLOURS[name], scale * forces[name]
+        colour, force = FORCE_COLOURS[name], scale * forces[name]
         low, high = np.clip(force - off, -most, most), np.clip(force + off, -most, most)
         axis.fill_between(values, low, high, color=colour, alpha=0.18, linewidth=0)
         axis.plot(values, force, color=colour, linewidth=1.6, label=label)
@@ -145,18 +153,18 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
     left.set(title="Force on the wheel; dotted: ±μN", ylabel="tangential force [kN]")
     right.set(title="Moment on the wheel about the normal", ylabel="Mz [N m]")
     for axis in (left, right):
-        axis.set_xlabel(LABELS[sweep.of])
+        axis.set_xlabel(CREEPAGE_LABELS[sweep.of])
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
     if stated:
         left.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="error of cells and theory")
     if checks:
         left.plot([], [], "o", color=DARK, markerfacecolor="white", markersize=5, label="exact theory")
     legend_below(figure, left)
-    heading(figure, title, {"forces": forces})
+    add_heading(figure, title, {"forces": forces})
     save(figure, path)
 
 
-STYLES = {
+THEORY_STYLES = {
     "linear theory": (GREY, "x"),
     "FASTSIM 1982": (VERMILION, "s"),
     "FASTSIM, plain march": (ORANGE, "v"),
@@ -181,12 +189,12 @@ def price_figure(price: Result, title: str) -> Figure:
     widths = (1.3, 1.0, 1.0)
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.6), sharey=True, width_ratios=widths)
     points: list[TheoryPoint] = price.detail
-    for name in STYLES:
+    for name in THEORY_STYLES:
         line = [point for point in points if point.name == name]
         if line:
-            _priced(axes[0], name, line, [point.cells**2 for point in line], bar=True)
+            _plot_theory(axes[0], name, line, [point.cells**2 for point in line], bar=True)
             micros = [1e6 * point.seconds for point in line]
-            _priced(axes[1 if name.startswith("FASTSIM") else 2], name, line, micros)
+            _plot_theory(axes[1 if name.startswith("FASTSIM") else 2], name, line, micros)
     for axis, above, label in zip(
         axes,
         ("By cells; bar: to 95 of 100 contacts", "FASTSIM by time", "Other theories by time"),
@@ -194,20 +202,20 @@ def price_figure(price: Result, title: str) -> Figure:
         strict=True,
     ):
         axis.set(xscale="log", yscale="log", xlabel=label, title=above)
-        for target in TARGETS:
+        for target in ERROR_TARGETS:
             axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].yaxis.set_minor_locator(NullLocator())
     axes[0].set(ylim=(0.1, LARGEST_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
     legend_below(figure, axes[0])
-    heading(figure, title, {"price": price})
+    add_heading(figure, title, {"price": price})
     return figure
 
 
-def _priced(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
+def _plot_theory(axis: Any, name: str, points: list[TheoryPoint], along: list[float], bar: bool = False) -> None:
     """Plot the mean error (%) of one theory. An optional bar at its largest number of cells reaches up to the error
     that 95 of 100 contacts do not exceed."""
-    colour, marker = STYLES[name]
+    colour, marker = THEORY_STYLES[name]
     mean, most = (100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "most"))
     label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
     axis.plot(along, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)

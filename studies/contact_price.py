@@ -13,7 +13,7 @@ from models.core.whole_files import write_whole
 from models.machine.seconds import cost
 from models.systems.contact.run import scene_contact
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced
+from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced_theories
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -44,7 +44,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Every theory on every number of cells; saves ``price.nc``, ``price.png`` and ``table.txt``."""
     check(scene, engines)
-    price = priced(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
+    price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
     price.save(folder / "price.nc")
     points, uncertain = price.detail, price["uncertainty"]
     table = _table(points, uncertain.size, uncertain.max())

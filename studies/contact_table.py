@@ -8,10 +8,10 @@ from typing import Any
 from models.core.errors import InputError
 from models.machine.seconds import duration
 from models.systems import run as run_scene
-from models.systems.contact.run import BLOCKS
+from models.systems.contact.run import BLOCKS_FOLDER
 from models.systems.contact.scene import ContactScene
 
-__all__ = ["BLOCKS"]  # what --resume goes on from
+__all__ = ["BLOCKS_FOLDER"]  # what --resume goes on from
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
 

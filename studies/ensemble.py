@@ -24,23 +24,23 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
-from models.ensemble.runner import BLOCK, Blocks, each_block, run_paths
+from models.ensemble.runner import PATHS_PER_BLOCK, Blocks, each_block, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew
-from models.systems.pitch_plane.assumptions import upright
-from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
-from models.systems.pitch_plane.path_statistics import PITCH, PathStatistics
+from models.systems.pitch_plane.assumptions import upright_assumption
+from models.systems.pitch_plane.noise_paths import largest_difference, mujoco_threads, noise_paths
+from models.systems.pitch_plane.path_statistics import PITCH_STATE, PathStatistics
 from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.virtual_measurement import check_road, follower, measure, write_measurement
+from models.systems.pitch_plane.virtual_measurement import check_road, follower_builder, measure, write_measurement
 from models.vehicles.pitch_plane import STATE_NAMES
 
 Progress = Callable[[str, float], None]
 
-BLOCKS = "blocks"
+BLOCKS_FOLDER = "blocks"
 """Folder of the finished blocks, within that of the results; a study that has one can be resumed."""
-QUANTILES = (0.05, 0.5, 0.95)
-HEAVE = 2
+PITCH_QUANTILES = (0.05, 0.5, 0.95)
+HEAVE_STATE = 2
 """Place of the heave among the states."""
 
 
@@ -50,7 +50,7 @@ class Options(Strict):
     paths: int = Field(500, ge=2, le=1_000_000, description="number of noise paths in the reference")
     saved: int = Field(1000, ge=1, le=1_000_000, description="first paths that are saved; statistics are of all")
     engine_paths: int = Field(4, ge=1, le=10_000, description="number of the first paths that other engines repeat")
-    block: int = Field(BLOCK, ge=1, le=100_000, description="paths that are computed, sent and kept together")
+    block: int = Field(PATHS_PER_BLOCK, ge=1, le=100_000, description="paths that are computed, sent and kept together")
     seed: int = Field(1, ge=0, lt=2**64, description="seed of the noise")
     rows: float = quantity("s", "spacing of the saved states", default=0.5)
     times: list[float] = Field([1.0, 2.0, 5.0, 10.0, 15.0], description="times (s) of the table, on saved rows")
@@ -93,10 +93,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
-        noisy = follower(scene, Path(name))({}, {"force_noise": noise})
+        noisy = follower_builder(scene, Path(name))({}, {"force_noise": noise})
         first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
-        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS, pool, cut, tell):
+        for block in each_block(noise_paths(*asked), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
             statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
@@ -105,10 +105,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                 repeated = run_paths(mujoco_threads(*asked, crew.workers), options.engine_paths)
             else:
                 repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
-            gaps[engine] = gap(statistics.first, repeated, times)
+            gaps[engine] = largest_difference(statistics.first, repeated, times)
     write_measurement(measured, folder, period)
-    rows = _rows(options, times, statistics)
-    channels, axes = _channels(times, statistics, options.saved)
+    rows = _deviation_rows(options, times, statistics)
+    channels, axes = _result_channels(times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
     _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
     table = text(options, scene, rows, statistics, gaps)
@@ -127,7 +127,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _channels(
+def _result_channels(
     times: np.ndarray, statistics: PathStatistics, saved_paths: int
 ) -> tuple[dict[str, Channel], dict[str, Channel]]:
     """Channels of the saved result and their axes: the first few paths, and the statistics over all paths."""
@@ -168,7 +168,11 @@ def _with_errors(
         for name, unit in (("pitch", "rad"), ("heave", "m"))
         for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }
-    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", lambda run: _steepest(statistics))]
+    assumed = [
+        upright_assumption(
+            "end the runs before, or hold their pitch (kalman_filter)", lambda run: _largest_pitch(statistics)
+        )
+    ]
     return of_chance(
         with_assumptions(result, assumed),
         {f"deviation of {name}": breach for name, breach in worst.items()},
@@ -176,18 +180,18 @@ def _with_errors(
     )
 
 
-def _steepest(statistics: PathStatistics) -> Watched:
+def _largest_pitch(statistics: PathStatistics) -> Watched:
     """Largest pitch (rad) over all paths at each time, for the check of an assumption; not a number where no path
     remains."""
     return {"any path": statistics.steepest}
 
 
-def _rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
+def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
     """Standard deviations of pitch and heave, with their standard errors, at the times that the options list."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
-        pitch, heave = (statistics.moments.deviation(row, place) for place in (PITCH, HEAVE))
+        pitch, heave = (statistics.moments.deviation(row, place) for place in (PITCH_STATE, HEAVE_STATE))
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows
@@ -208,9 +212,9 @@ def text(
         for row in rows
     ]
     lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
-    for level in QUANTILES:
+    for level in PITCH_QUANTILES:
         value, low, high = statistics.drift_off.quantile(level)
-        lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
+        lines.append(f"  {100 * level:7g} %   {_time_text(value)}   ({_time_text(low)} to {_time_text(high)})")
     lines += [f"  {statistics.lost} paths left all bounds and count as drifted off by then"] if statistics.lost else []
     for engine, worst in gaps.items():
         differ = (
@@ -221,7 +225,7 @@ def text(
     return lines
 
 
-def _time(value: float) -> str:
+def _time_text(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "never"
 
 
@@ -229,7 +233,7 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
     """Plot percentiles of the pitch error over time, and a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, heading, save, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], statistics.fan[:, 1:])
@@ -240,7 +244,7 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
     there = np.isfinite(statistics.drift_off.values)
     drifted, counts = statistics.drift_off.values[there], statistics.drift_off.counts[there]
     histogram.hist(drifted, bins=40, weights=counts, color=BLUE, alpha=0.6)
-    for level, style in zip(QUANTILES, (":", "-", ":"), strict=True):
+    for level, style in zip(PITCH_QUANTILES, (":", "-", ":"), strict=True):
         value = statistics.drift_off.quantile(level)[0]
         if np.isfinite(value):
             histogram.axvline(value, color=DARK, linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
@@ -250,7 +254,7 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
     for axes in (fan, histogram):
         axes.set_xlabel("time [s]")
     title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
-    heading(figure, title, results)
+    add_heading(figure, title, results)
     save(figure, folder / "ensemble.png")
 
 

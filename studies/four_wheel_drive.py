@@ -14,15 +14,15 @@ from models.systems.handling.run import Drive
 from models.systems.handling.run import run as run_handling
 from models.systems.handling.scene import build
 
-DURATION, RATE, SPEED = 30.0, 50, 20.0
+DURATION, SAMPLING_RATE, START_SPEED = 30.0, 50, 20.0
 """s, samples a second, m/s at the start."""
-NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.3, "side slip": 0.0008}
+NOISE_DEVIATIONS = {"yaw rate": 0.004, "lateral acceleration": 0.3, "side slip": 0.0008}
 """Standard deviations (rad/s, m/s^2, rad) of white noise, sample by sample."""
 SEED = 20
 Knots = list[list[float]]
 
 
-def controls() -> dict[str, Knots]:
+def random_controls() -> dict[str, Knots]:
     """Random steer, brake and drive inputs, as values at given times."""
     random = np.random.default_rng(SEED)
     steer, drive, brake, at, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
@@ -37,16 +37,16 @@ def controls() -> dict[str, Knots]:
     return {"steer": steer, "drive": drive, "brake": brake}
 
 
-def driven() -> Drive:
+def simulated_drive() -> Drive:
     """The drive, simulated in MuJoCo."""
-    manoeuvre = {"speed": SPEED, "duration": DURATION, "front_brake": 0.6, **controls()}
+    manoeuvre = {"speed": START_SPEED, "duration": DURATION, "front_brake": 0.6, **random_controls()}
     table = {"title": "a drive that is made", "system": "handling", "manoeuvres": {"drive": manoeuvre}}
     return run_handling(build(table), "mujoco").detail
 
 
-def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
+def measured_columns(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
     """Columns (unit, values) of the drive, as a logger in the car would write them."""
-    every = round(1.0 / (RATE * float(drive.run.times[1] - drive.run.times[0])))
+    every = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))
     ahead, aside, yaw = drive.velocity().T
     random = np.random.default_rng(SEED + 1)
     front = drive["steer"][:, 0]
@@ -56,7 +56,7 @@ def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
         "side slip": ("rad", np.arctan2(aside, ahead)),
     }
     noisy = {
-        name: (unit, values[::every] + NOISE[name] * random.standard_normal(len(values[::every])))
+        name: (unit, values[::every] + NOISE_DEVIATIONS[name] * random.standard_normal(len(values[::every])))
         for name, (unit, values) in channels.items()
     }
     plain = {"time": ("s", drive.run.times), "steer": ("rad", front), "speed": ("m/s", ahead)}
@@ -65,7 +65,7 @@ def measured(drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
 
 def save(path: Path) -> None:
     """Write the measurement with six digits."""
-    columns = measured(driven())
+    columns = measured_columns(simulated_drive())
     head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
     rows = zip(*(values.tolist() for _, values in columns.values()), strict=True)
     write_whole(path, "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in rows), ""]))

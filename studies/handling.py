@@ -13,7 +13,7 @@ from models.systems.handling.scene import HandlingScene
 
 SYSTEM = "handling"
 Progress = Callable[[str, float], None]
-DIFFERENCE = "largest difference of the engines"
+DIFFERENCE_TITLE = "largest difference of the engines"
 
 
 def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
             title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
             manoeuvre_figure(runs, title, folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
-            answer[name] = _answer(runs)
+            answer[name] = _answer_of_drive(runs)
             lines.append(_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
@@ -51,7 +51,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _answer(runs: dict[str, Result]) -> dict[str, float]:
+def _answer_of_drive(runs: dict[str, Result]) -> dict[str, float]:
     first, *others = runs.values()
     drive = first.detail
     said = {
@@ -63,13 +63,15 @@ def _answer(runs: dict[str, Result]) -> dict[str, float]:
         "largest power of a contact [W]": first["power"].max(),
     }
     if others:
-        said[DIFFERENCE] = max(np.abs(first[key] - run[key]).max() for run in others for key in ("positions", "rates"))
+        said[DIFFERENCE_TITLE] = max(
+            np.abs(first[key] - run[key]).max() for run in others for key in ("positions", "rates")
+        )
     return {key: float(value) for key, value in said.items()}
 
 
 def _line(name: str, answer: dict[str, float]) -> str:
     yaw, lateral, load, used = list(answer.values())[:4]
-    gap = f"{answer[DIFFERENCE]:>10.1e}" if DIFFERENCE in answer else ""
+    gap = f"{answer[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in answer else ""
     return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
 
 

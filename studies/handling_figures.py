@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from models.core.told import Results
-from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, heading, legend_below, panels, save
+from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, SKY, VERMILION, add_heading, legend_below, panels, save
 from models.systems.handling.run import Drive
 
-TYRES, LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
+TYRE_COLOURS, TYRE_LINES = (BLUE, SKY, VERMILION, ORANGE), ("-", "--", ":", "-.")
 """Colours of four tyres, and lines of the first four, the next four (of what is towed) and so on."""
 
 
-CORNERS = {
+CORNER_NAMES = {
     "fl": "front left",
     "fr": "front right",
     "rl": "rear left",
@@ -45,20 +45,20 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
         (moments, drive["mz"], "moment [N m]", "Aligning moments"),
     ):
         for i, tyre in enumerate(drive.handling.vehicle.tyres):
-            axis.plot(drive.run.times, values[:, i], label=CORNERS.get(tyre.name, tyre.name), **_tyre_style(i))
+            axis.plot(drive.run.times, values[:, i], label=CORNER_NAMES.get(tyre.name, tyre.name), **_tyre_style(i))
         axis.set(ylabel=label, title=name)
     for axis in over_time:
         axis.set_xlabel("time [s]")
-    _circle(circle_axis, drive)
+    _plot_friction_circle(circle_axis, drive)
     legend_below(figure, slips)
     start = f"from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}"
-    heading(figure, f"{title}: {start}", runs)
+    add_heading(figure, f"{title}: {start}", runs)
     return save(figure, path)
 
 
 def _tyre_style(i: int) -> dict[str, Any]:
     """Line colour and line style of the tyre with this number."""
-    return {"color": TYRES[i % 4], "linestyle": LINES[i // 4 % 4]}
+    return {"color": TYRE_COLOURS[i % 4], "linestyle": TYRE_LINES[i // 4 % 4]}
 
 
 def _path(axis: Axes, drive: Drive) -> None:
@@ -73,7 +73,7 @@ def _path(axis: Axes, drive: Drive) -> None:
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
 
 
-def _circle(axis: Axes, drive: Drive) -> None:
+def _plot_friction_circle(axis: Axes, drive: Drive) -> None:
     """Plot the force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)

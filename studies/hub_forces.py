@@ -8,9 +8,9 @@ import numpy as np
 from models.core.result import join_results
 from models.core.strict import Strict, read
 from models.core.time_series import write_time_series
-from models.systems.hub_forces.comparison import METHODS, Comparison, Progress, compare
-from models.systems.hub_forces.run import MOTION
-from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
+from models.systems.hub_forces.comparison import METHOD_OF_RUN, Comparison, Progress, compare
+from models.systems.hub_forces.run import MOTION_CHANNELS
+from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene
 
 SYSTEM = "hub-forces"
 
@@ -38,7 +38,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "failed": {},
         "answer": comparison.answer(),
         "results": comparison.results,
-        "doubts": list(comparison.measurement.tilt.doubts),
+        "doubts": list(comparison.measurement.tilt.objections),
         "table": _table(scene, comparison),
     }
 
@@ -48,7 +48,7 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
     off = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
     lines = [
-        f"  forces in the frame {scene.forces.frame!r}; innovations squared {tilt.surprise:.2f} times",
+        f"  forces in the frame {scene.forces.frame!r}; innovations squared {tilt.normalised_innovation:.2f} times",
         f"  {'':<18}{'roll':>9}{'pitch':>9}{'heading':>9}{'x':>8}{'y':>8}{'z':>8}{'drift-off':>11}"
         f"{'moments rms':>16}   {damage}",
         f"  {off:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
@@ -67,9 +67,9 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
         )
     if not known:
         lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
-    lines += [f"  doubt: {text}" for text in tilt.doubts]
+    lines += [f"  doubt: {text}" for text in tilt.objections]
     lines += [f"  {name}: {text}" for name, text in comparison.failed.items()]
-    if len(comparison.runs) > len(METHODS):
+    if len(comparison.runs) > len(METHOD_OF_RUN):
         lines.append(f"  engines before drift-off: {comparison.engines_apart():.1e}")
     return lines
 
@@ -79,14 +79,20 @@ def save(comparison: Comparison, folder: Path) -> None:
     ``runs.csv``."""
     measurement = comparison.measurement
     names = [
-        (f"{hub}_{name}", next(iter(units))) for hub in measurement.vehicle.hubs for name, units in COMPONENTS.items()
+        (f"{hub}_{name}", next(iter(units)))
+        for hub in measurement.vehicle.hubs
+        for name, units in COLUMNS_OF_HUB.items()
     ]
-    _write(folder / "hub_forces.csv", names, measurement.forces)
-    _write(folder / "angles.csv", [(name, next(iter(units))) for name, units in ANGLES.items()], measurement.angles)
+    _write_samples(folder / "hub_forces.csv", names, measurement.forces)
+    _write_samples(
+        folder / "angles.csv",
+        [(name, next(iter(units))) for name, units in COLUMNS_OF_ANGLES.items()],
+        measurement.angles,
+    )
     runs = comparison.results
-    angles, places = list(MOTION)[:3], list(MOTION)[3:]
+    angles, places = list(MOTION_CHANNELS)[:3], list(MOTION_CHANNELS)[3:]
     columns = {
-        f"{name}: {channel}": (MOTION[channel][1], path[channel])
+        f"{name}: {channel}": (MOTION_CHANNELS[channel][1], path[channel])
         for channels in (angles, places)
         for name, path in runs.items()
         for channel in channels
@@ -95,7 +101,7 @@ def save(comparison: Comparison, folder: Path) -> None:
     join_results(runs, "run").save(folder / "runs.nc")
 
 
-def _write(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
+def _write_samples(path: Path, names: list[tuple[str, str]], measured: Any) -> None:
     """Write sampled hub forces or angles to a CSV file, with a column for each name and unit."""
     columns = {name: (unit, measured.samples[:, i]) for i, (name, unit) in enumerate(names)}
     write_time_series(path, columns, measured.period)

@@ -9,27 +9,27 @@ from models.drawing.figures import (
     COLUMN_WIDTH,
     DARK,
     GREEN,
-    TRUTH,
+    TRUTH_COLOUR,
     VERMILION,
     about_one,
-    heading,
+    add_heading,
     legend_below,
     save,
     subplots,
 )
 from models.systems.hub_forces.comparison import Comparison
 
-COLOURS = {"free": VERMILION, "filter": BLUE, "prescribed": GREEN}
-TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
+METHOD_COLOURS = {"free": VERMILION, "filter": BLUE, "prescribed": GREEN}
+DAMAGE_TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
 """Marked ratios of damage, as far as there are such."""
-LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
+METHOD_LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
 
 
 def _drawn_runs(comparison: Comparison) -> list[tuple[str, str, str]]:
     """Name, label and colour of each run to draw. Of the free runs, which look alike, only the last is drawn."""
     free = [(name, "free") for name in comparison.runs if name.startswith("free")][-1:]
-    rest = [(name, label) for name, label in LABELS.items() if name in comparison.runs]
-    return [(name, label, COLOURS[name.split(",")[0]]) for name, label in (*free, *rest)]
+    rest = [(name, label) for name, label in METHOD_LABELS.items() if name in comparison.runs]
+    return [(name, label, METHOD_COLOURS[name.split(",")[0]]) for name, label in (*free, *rest)]
 
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
@@ -42,13 +42,13 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
             drawn = comparison.runs[run]
             axis.plot(drawn.times, factor * drawn[channel], color=colour, label=label)
         if true := comparison.truth:
-            axis.plot(true.times, factor * true[channel], "--", color=TRUTH, label="true", linewidth=0.9)
+            axis.plot(true.times, factor * true[channel], "--", color=TRUTH_COLOUR, label="true", linewidth=0.9)
         axis.set(title=name.capitalize(), ylabel=f"[{unit}]")
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
     legend_below(figure, axes[0, 0])
     frame = comparison.measurement.forces.frame
-    heading(figure, f"{title}\nThe chassis on forces in the frame '{frame}'", comparison.results)
+    add_heading(figure, f"{title}\nThe chassis on forces in the frame '{frame}'", comparison.results)
     save(figure, path)
 
 
@@ -66,11 +66,11 @@ def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     axis.set_xticks(range(len(ratios)), [*ratios], rotation=90)
     least, most = min(0.9, *values), max(1.1, *values)
     low, high = least * (0.8 if least > 0.5 else 0.1), most * (1.25 if most < 2.0 else 10.0)
-    about_one(axis, "y", [tick for tick in TICKS if low <= tick <= high])
+    about_one(axis, "y", [tick for tick in DAMAGE_TICKS if low <= tick <= high])
     axis.set_ylim(low, high)
     axis.set_ylabel("damage / true damage [-]" if comparison.truth else "damage / that with the filter [-]")
     legend_below(figure, axis)
     frame = comparison.measurement.forces.frame
     text = f"{title}\nSection forces in the chassis' axes, slope 5: forces in the frame '{frame}'"
-    heading(figure, text, comparison.results)
+    add_heading(figure, text, comparison.results)
     save(figure, path)

@@ -22,11 +22,11 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.angle_damage import UnitPaths, damage_errors, log_damage_over_pitch_error, unit_paths
-from models.drift.score import CHANNELS
-from models.ensemble.statistics import ERRORS_95, quantile
-from models.fatigue.damage import SLOPE
+from models.drift.score import SECTION_FORCE_CHANNELS
+from models.ensemble.statistics import ERRORS_95, quantile_with_interval
+from models.fatigue.damage import WOEHLER_SLOPE
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance
-from models.systems.pitch_plane.assumptions import watching
+from models.systems.pitch_plane.assumptions import watch_function
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 
@@ -100,20 +100,22 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         results[engine] = result
         curves[engine] = log_damage_over_pitch_error(result, reach, scene.file)
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
-    rows = [_row(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs]
+    rows = [
+        _row_of_grade(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs
+    ]
     table = text(rows, options, tuple(curves))
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     if curves:
         from models.drawing.figures import save
 
-        results["units"] = _units(scene, paths, options, next(iter(curves.values())))
+        results["units"] = _errors_of_grades(scene, paths, options, next(iter(curves.values())))
         save(_figure_grades(rows, options, results), folder / "grades.png")
         save(_figure_curve(next(iter(curves.values()))), folder / "damage_of_an_angle.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "rows": rows,
-        "cheapest": cheapest(rows, options),
+        "cheapest": coarsest_sufficient_grade(rows, options),
         "failed": failed,
         "results": results,
         "table": table,
@@ -126,12 +128,12 @@ def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
     return walk * paths[0] + drift * paths[1]
 
 
-def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
+def _errors_of_grades(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
     """For each grade, the largest angle error (rad) over the longest drive. Also the damage error that the share
     KEEPING_SHARE of its units does not exceed, with its standard error."""
     angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
     worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
-    kept = [quantile(each, KEEPING_SHARE) for each in worst]
+    kept = [quantile_with_interval(each, KEEPING_SHARE) for each in worst]
     channels = {
         "angle_error": Channel("grade", [float(np.abs(each).max()) for each in angles], "rad", "largest angle error"),
         "damage_error": Channel("grade", [middle for middle, _, _ in kept], "", "damage error"),
@@ -142,7 +144,12 @@ def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline)
         units,
         [
             Assumption(
-                "small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST_ANGLE_ERROR
+                "small angle errors",
+                says,
+                remedy,
+                watch_function(units="angle_error"),
+                "rad",
+                upper_limit=LARGEST_ANGLE_ERROR,
             )
         ],
     )
@@ -159,7 +166,7 @@ def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
     return np.degrees(angle_variance(seconds, walk, 0.0, drift, options.correlation_time) ** 0.5)
 
 
-def _row(
+def _row_of_grade(
     options: Options, grade: int, minutes: float, every_angle: np.ndarray, curves: dict[str, CubicSpline]
 ) -> dict[str, Any]:
     """Results for one gyro grade over one duration: angle error by the law and by measurement, and damage error per
@@ -179,7 +186,7 @@ def _row(
     }
 
 
-def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
+def coarsest_sufficient_grade(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
     """For each duration in minutes, the coarsest grade (deg/h) of which the share KEEPING_SHARE of units keeps the
     allowed damage error."""
     cheapest_grades: dict[str, float | None] = {}
@@ -197,15 +204,16 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
     lines = [
         f"  {row['grade']:>7g} {row['random walk']:>9g} {row['minutes']:>8g}   {row['angle by law']:>9.2e} "
         f"{row['angle measured']:>9.2e}   "
-        + " ".join(f"{_percent(half):>8} /{_percent(sure):>8}" for half, sure in row["damage error"].values())
+        + " ".join(f"{_percent_text(half):>8} /{_percent_text(sure):>8}" for half, sure in row["damage error"].values())
         for row in rows
     ]
     best = [
         f"  {minutes:>5} min: {'none of these' if grade is None else f'{grade:g} deg/h'}"
-        for minutes, grade in cheapest(rows, options).items()
+        for minutes, grade in coarsest_sufficient_grade(rows, options).items()
     ]
     return [
-        f"  Damage: rainflow after ASTM E1049-85, the run repeated; slope {SLOPE:g}; worst of {', '.join(CHANNELS)}.",
+        f"  Damage: rainflow after ASTM E1049-85, the run repeated; slope {WOEHLER_SLOPE:g}; worst of "
+        f"{', '.join(SECTION_FORCE_CHANNELS)}.",
         f"  Angle: rms of {options.samples} units at the end. Damage error [%]: median / {KEEPING_SHARE:.0%} of all "
         "units.",
         f"    grade      walk     time     angle error [deg]   {names}",
@@ -217,13 +225,13 @@ def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...])
     ]
 
 
-def _percent(share: float) -> str:
+def _percent_text(share: float) -> str:
     return f"{100 * share:.2g}" if share < 1 else f"{100 * share:,.0f}"
 
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
     """Plot angle error and damage error over the length of the drive, with a line for each gyro grade."""
-    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
@@ -240,22 +248,22 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
         title=f"Damage error that {KEEPING_SHARE:.0%} of all units keep [%]", xlabel="length of the drive [min]"
     )
     legend_below(figure, axes[1], columns=len(options.grades) + 1)
-    heading(figure, "What the grade of a gyro does to angle and damage", results)
+    add_heading(figure, "What the grade of a gyro does to angle and damage", results)
     return figure
 
 
 def _figure_curve(curve: CubicSpline) -> Any:
     """Plot the damage error over a constant angle error."""
-    from models.drawing.drift import NAMES
-    from models.drawing.figures import heading, subplots
+    from models.drawing.drift import CHANNEL_LABELS
+    from models.drawing.figures import add_heading, subplots
 
     figure, axis = subplots(figsize=(7, 3.8))
     angles = np.linspace(curve.x[0], curve.x[-1], 401)
-    for i, name in enumerate(CHANNELS):
-        axis.semilogy(np.degrees(angles), np.exp(curve(angles)[:, i]), label=NAMES[name])
+    for i, name in enumerate(SECTION_FORCE_CHANNELS):
+        axis.semilogy(np.degrees(angles), np.exp(curve(angles)[:, i]), label=CHANNEL_LABELS[name])
     axis.set(ylabel="damage / true damage [-]", xlabel="constant error of the pitch [deg]")
     axis.legend(ncols=2)
-    heading(figure, "What a wrong pitch does to the damage of the section forces")
+    add_heading(figure, "What a wrong pitch does to the damage of the section forces")
     return figure
 
 

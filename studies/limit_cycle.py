@@ -12,7 +12,7 @@ from models.core.strict import Strict, quantity, read
 from models.rail.equations import YAW
 from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.of_scene import wheelset_of
-from models.systems.wheelset.run import ORBIT, branch, cycle_speed, cycles
+from models.systems.wheelset.run import ORBIT_CHANNELS, branch_result, cycle_speed, cycles_of_engines
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
@@ -44,17 +44,19 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import branch_figure, cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    branched = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error)
+    branched = branch_result(
+        scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error
+    )
     orbits, notes = branched.detail, json.loads(branched.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
     progress(f"cycle at {speed:g} m/s", 0.6)
-    results, failed = cycles(scene, engines, speed, error=scene.error)
+    results, failed = cycles_of_engines(scene, engines, speed, error=scene.error)
     by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     for engine, result in results.items():
         result.save(folder / f"cycle_{engine}.nc")
     if orbits:
         branched.save(folder / "branch.nc")
-        branched.save_table(folder / "branch.csv", *ORBIT)
+        branched.save_table(folder / "branch.csv", *ORBIT_CHANNELS)
         branch_figure(branched, wheelset_of(scene), scene.title, folder / "branch.png")
     if by_engine:
         cycle_figure(results, scene.title, folder / "cycle.png")
@@ -65,9 +67,9 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "folder": str(folder),
         "failed": failed,
         "answer": {
-            "branch": [_numbers_of_orbit(orbit, *ORBIT) for orbit in orbits],
+            "branch": [_numbers_of_orbit(orbit, *ORBIT_CHANNELS) for orbit in orbits],
             "cycles": {
-                engine: _numbers_of_orbit(orbit, *(name for name in ORBIT if name != "multiplier"))
+                engine: _numbers_of_orbit(orbit, *(name for name in ORBIT_CHANNELS if name != "multiplier"))
                 for engine, orbit in by_engine.items()
             },
         },

@@ -13,14 +13,20 @@ from models.machine.seconds import cost
 from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail import run as system
 from models.systems.wheel_rail.plan import case_text
-from models.systems.wheel_rail.run import PATCH, POSITION, WHEELS, patches, position_quantities
+from models.systems.wheel_rail.run import (
+    PATCH_QUANTITIES,
+    POSITION_UNITS,
+    WHEEL_NAMES,
+    patches_by_force,
+    position_quantities,
+)
 from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
 Progress = Callable[[str, float], None]
-FLANGE = 0.8
+FLANGE_ANGLE = 0.8
 """Contact angle (rad) from which on a patch is called one of the flange."""
-PANELS = {
+PANEL_TITLES = {
     "on_rail": "on the rail,\nfrom its top [mm]",
     "on_wheel": "on the wheel [mm]",
     "angle": "contact angle [deg]",
@@ -28,7 +34,7 @@ PANELS = {
     "peak": "largest pressure [MPa]",
 }
 """What is drawn, a row each."""
-HEADS = {
+PRINTED_COLUMNS = {
     "on_rail": "8.2f",
     "on_wheel": "8.2f",
     "angle": "7.2f",
@@ -41,7 +47,7 @@ HEADS = {
     "fy": "7.3f",
 }
 """Columns that are printed, and how."""
-NOTES = [
+TABLE_NOTES = [
     "  centre of pressure: on the rail from its highest point, on the wheel from the taping line, outwards (mm);",
     "  angle of the rail there (deg, down towards the middle); N: normal; Fx, Fy: on the wheel, out (kN); peak (MPa);",
     "  area (mm^2); a, b: half its length and width (mm); dr: rolling radius, right less left (mm)",
@@ -60,7 +66,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table(contacts.placed)]
         if contacts.placed:
-            _save(name, result, folder)
+            _save_tables(name, result, folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placed}:
         _figure(scene, drawn, folder / "manchester.png")
     answer = {
@@ -72,7 +78,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
         "failed": failed,
         "answer": answer,
         "results": results,
-        "table": [*table, *NOTES],
+        "table": [*table, *TABLE_NOTES],
     }
 
 
@@ -80,13 +86,13 @@ def _report_progress(progress: Progress, scene: WheelRailScene, k: int, shift: f
     progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
 
 
-def _save(name: str, result: Result, folder: Path) -> None:
+def _save_tables(name: str, result: Result, folder: Path) -> None:
     """Save the result, with a CSV row for each position and another file's row for each patch of each wheel."""
     result.save(folder / f"{name}.nc")
-    result.save_table(folder / f"{name}.csv", *POSITION)
-    units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH.items()}}
+    result.save_table(folder / f"{name}.csv", *POSITION_UNITS)
+    units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH_QUANTITIES.items()}}
     positions = [position_quantities(placed) for placed in result.detail.placed]
-    for wheel in WHEELS:
+    for wheel in WHEEL_NAMES:
         rows = [
             {"shift": position["shift"], "patch": k, **patch}
             for position in positions
@@ -98,11 +104,11 @@ def _save(name: str, result: Result, folder: Path) -> None:
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
     """Plot the contact patches, with a column of panels per wheel; bars in the first row show the patches' widths."""
-    from models.drawing.figures import COLUMN_WIDTH, TURNS, heading, legend_below, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, CURVE_COLOURS, add_heading, legend_below, save, subplots
 
-    drawn, axes = subplots(len(PANELS), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")
-    for column, wheel in enumerate(WHEELS[::-1]):
-        for axis, (quantity, label) in zip(axes[:, column], PANELS.items(), strict=True):
+    drawn, axes = subplots(len(PANEL_TITLES), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")
+    for column, wheel in enumerate(WHEEL_NAMES[::-1]):
+        for axis, (quantity, label) in zip(axes[:, column], PANEL_TITLES.items(), strict=True):
             for k, (name, result) in enumerate(results.items()):
                 case, data = scene.cases[name], result.data.sel(wheel=wheel)
                 # later cases hollow and beside, so that equal ones show
@@ -114,9 +120,9 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
                     yerr=half.values.ravel() if quantity == "on_rail" else None,
                     fmt="os"[k % 2],
                     markersize=4,
-                    color=TURNS[k % len(TURNS)],
+                    color=CURVE_COLOURS[k % len(CURVE_COLOURS)],
                     linewidth=1.6,
-                    markerfacecolor=TURNS[0] if k == 0 else "white",
+                    markerfacecolor=CURVE_COLOURS[0] if k == 0 else "white",
                     label=f"{name}: {case_text(case.yaw, case.friction)}",
                 )
             if column == 0:
@@ -125,7 +131,7 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
         axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
     legend_below(drawn, axes[0, 0], columns=2)
     title = f"{scene.title}\nEvery patch; bars in the first row are its width"
-    heading(drawn, title, results)
+    add_heading(drawn, title, results)
     save(drawn, path)
 
 
@@ -136,10 +142,10 @@ def _table(placed: list[WheelsetPlacement]) -> list[str]:
         f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
     )
-    each = [(position, wheel) for position in placed for wheel in WHEELS]
+    each = [(position, wheel) for position in placed for wheel in WHEEL_NAMES]
     several = [f"{1e3 * laid.shift:g} ({wheel})" for laid, wheel in each if len(getattr(laid, wheel)) > 1]
-    flange = [laid.shift for laid, wheel in each if patches(laid, wheel)[0].angle < -FLANGE]
-    lines = [heads, *(line for position in map(position_quantities, placed) for line in _lines(position))]
+    flange = [laid.shift for laid, wheel in each if patches_by_force(laid, wheel)[0].angle < -FLANGE_ANGLE]
+    lines = [heads, *(line for position in map(position_quantities, placed) for line in _patch_lines(position))]
     if several:
         lines.append(f"    several patches on one wheel at, in mm: {', '.join(several)}")
     if flange:
@@ -149,12 +155,12 @@ def _table(placed: list[WheelsetPlacement]) -> list[str]:
     return lines
 
 
-def _lines(position: dict[str, Any]) -> Iterator[str]:
+def _patch_lines(position: dict[str, Any]) -> Iterator[str]:
     """A line for each patch of a position."""
-    for wheel in WHEELS:
+    for wheel in WHEEL_NAMES:
         for k, patch in enumerate(position[wheel]):
             lead = f"{position['shift']:6.2f} {wheel:<5}" if k == 0 else " " * 12
-            values = "".join(f"{patch[key]:{form}}" for key, form in HEADS.items())
+            values = "".join(f"{patch[key]:{form}}" for key, form in PRINTED_COLUMNS.items())
             end = f"{position['radius_difference']:8.3f}" if k == 0 and wheel == "right" else ""
             yield f"    {lead}{values}{end}"
 

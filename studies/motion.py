@@ -23,34 +23,34 @@ from models.core.tables import ACCELERATIONS
 from models.core.time_series import read_time_series, write_time_series
 from models.core.told import Results
 from models.core.whole_files import write_whole
-from models.drift.score import rms
+from models.drift.score import root_mean_square
 from models.sensors.motion_assumptions import Record, assumptions
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
-    LIMIT,
+    UNEXPLAINED_SHARE_LIMIT,
     CutOffs,
     Quality,
     RecoveredMotion,
-    Start,
+    StartState,
     check_cut_off,
-    motion,
-    quality,
-    spin,
+    fit_quality,
+    recovered_motion,
+    spin_from_readings,
     tilt_displacement,
 )
 from models.sensors.rotations import GimbalLock
 from models.sensors.sensor_array import SensorArray, sensor_array
-from models.systems.pitch_plane.effects.accelerometers import Parameters, names
+from models.systems.pitch_plane.effects.accelerometers import Parameters, channels_of_sensors
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
 from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
-CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
+COMPARED_CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
 """What is compared -> the run's channel and its unit."""
-TILT = 1e-3
+TABLE_TILT = 1e-3
 """Tilt error (rad) of the false displacement in the table."""
-SENSORS = "effects.accelerometers.sensors"
+SENSORS_KEY = "effects.accelerometers.sensors"
 
 
 class Options(Strict):
@@ -73,36 +73,36 @@ class Source:
     truth: dict[str, np.ndarray] = field(default_factory=dict)
     gyro: np.ndarray | None = None
     quality: Quality | None = None
-    ways: dict[str, RecoveredMotion] = field(default_factory=dict)
+    recovered_motions: dict[str, RecoveredMotion] = field(default_factory=dict)
     run: Result | None = None
 
     @property
-    def start(self) -> Start:
+    def start(self) -> StartState:
         """Initial attitude and velocity of the recovered motion: those of the run, or at rest and level."""
         first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
-        return Start.pitched(*first) if self.truth else Start()
+        return StartState.pitched(*first) if self.truth else StartState()
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Readings of each engine or of the file, the motion recovered in each way, a table and a figure."""
     options, p = check(scene, engines)
-    array = _array(scene, p.positions())
+    array = _sensor_array(scene, p.positions())
     failed: dict[str, str] = {}
     sources: list[Source] = []
     results: dict[str, Result] = {}
     for i, name in enumerate(engines if options.file is None else (options.file,)):
         progress(f"{name}: readings and motion", i / len(engines))
         try:
-            source = _run(scene, name, folder) if options.file is None else _measured(scene, options, p)
-            _recover(source, array, options, p)
+            source = _run(scene, name, folder) if options.file is None else _measured_readings(scene, options, p)
+            _recover_motions(source, array, options, p)
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
             continue
         results |= {} if source.run is None else {name: source.run}
-        results[f"{name}: motion"] = _save(scene, source, folder, options)
+        results[f"{name}: motion"] = _save_motions(scene, source, folder, options)
         sources.append(source)
     arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
-    table = [*arranged, *(line for source in sources for line in _lines(source, p)), *_closing(options)]
+    table = [*arranged, *(line for source in sources for line in _screen_lines(source, p)), *_closing_lines(options)]
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)
     if sources:
@@ -123,12 +123,12 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
     if "accelerometers" not in scene.effects:
         raise InputError(scene.file, "effects.accelerometers", None, "is missing: this study reads accelerometers")
     p = scene.effects["accelerometers"]
-    _array(scene, p.positions())
+    _sensor_array(scene, p.positions())
     if scene.run.output_step is not None:
         allowed = "this study reads its sensors at every step, and saves their samples alone: drop this key"
         raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
     if options.file is not None:
-        source = _measured(scene, options, p)
+        source = _measured_readings(scene, options, p)
         count, period = len(source.readings), source.period
     else:
         if options.zeroed:
@@ -143,22 +143,22 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
     return options, p
 
 
-def _array(scene: Scene, positions: dict[str, tuple[float, float, float]]) -> SensorArray:
+def _sensor_array(scene: Scene, positions: dict[str, tuple[float, float, float]]) -> SensorArray:
     """The scene's sensors as an array. An InputError about them names the scene's file and the sensors' key."""
     try:
         return sensor_array(positions)
     except InputError as error:
-        raise InputError(scene.file, SENSORS, error.value, error.allowed) from None
+        raise InputError(scene.file, SENSORS_KEY, error.value, error.allowed) from None
 
 
-def _measured(scene: Scene, options: Options, p: Parameters) -> Source:
+def _measured_readings(scene: Scene, options: Options, p: Parameters) -> Source:
     """Readings of the user's file, columns in the order of the scene's sensors."""
     assert options.file is not None
     return _from_file(options.file, scene.path(options.file, "options.file"), p)
 
 
 def _from_file(name: str, path: Path, p: Parameters) -> Source:
-    values, period = read_time_series(path, dict.fromkeys(chain(*names(p)), ACCELERATIONS))
+    values, period = read_time_series(path, dict.fromkeys(chain(*channels_of_sensors(p)), ACCELERATIONS))
     return Source(name, values.reshape(len(values), -1, 3), period)
 
 
@@ -167,59 +167,64 @@ def _run(scene: Scene, engine: str, folder: Path) -> Source:
     p = scene.effects["accelerometers"]
     made = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
-    write(made, {channel: channel for channel in chain(*names(p))}, p.sampling_rate, path)
+    write(made, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _from_file(engine, path, p)
     rows = np.searchsorted(made.times, source.period * (np.arange(len(source.readings)) - 1e-3))
-    wanted = {name: channel for name, (channel, _) in CHANNELS.items()} | {"heave rate": "z3_rate"}
+    wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}
     source.truth = {name: made[channel][rows] for name, channel in wanted.items()}
     source.run = made
     source.gyro = made["gyro"][rows] if "gyro" in made.data else None
     return source
 
 
-def _recover(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
+def _recover_motions(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
     """Recover the motion by every method. A suspect sensor, whose readings do not fit a rigid body, is used by the
     first method only."""
-    source.quality = quality(array, source.readings, p.deviation)
+    source.quality = fit_quality(array, source.readings, p.deviation)
     suspect, readings = source.quality.suspect, source.readings
-    moved = partial(motion, period=source.period, start=source.start, zeroed=options.zeroed)
+    moved = partial(recovered_motion, period=source.period, start=source.start, zeroed=options.zeroed)
     if suspect:
-        source.ways["all sensors, integrated"] = moved(array, readings)
+        source.recovered_motions["all sensors, integrated"] = moved(array, readings)
         readings = readings[:, [name != suspect for name in array.names]]
         array = sensor_array({name: place for name, place in p.positions().items() if name != suspect})
-    source.ways["integrated"] = moved(array, readings)
+    source.recovered_motions["integrated"] = moved(array, readings)
     if p.deviation > 0:
-        held, _ = filter_rates(spin(array, readings), source.period, np.array(source.start.rates), p.deviation)
-        source.ways["rates held by w w^T"] = moved(array, readings, rates=held)
+        held, _ = filter_rates(
+            spin_from_readings(array, readings), source.period, np.array(source.start.rates), p.deviation
+        )
+        source.recovered_motions["rates held by w w^T"] = moved(array, readings, rates=held)
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
-        source.ways["rates from the gyro"] = moved(array, readings, rates=turning)
+        source.recovered_motions["rates from the gyro"] = moved(array, readings, rates=turning)
     cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
-    source.ways["high-passed"] = moved(array, readings, cut_offs=cut_offs)
+    source.recovered_motions["high-passed"] = moved(array, readings, cut_offs=cut_offs)
 
 
-def _values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
+def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
     """Pitch (rad), pitch rate (rad/s) and heave (m, down) of a recovered motion."""
     return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
 
 
-def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
+def _save_motions(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
     returned."""
-    stem, ways = Path(source.name).stem, {way: _values(moved) for way, moved in source.ways.items()}
+    stem, ways = (
+        Path(source.name).stem,
+        {way: _compared_values(moved) for way, moved in source.recovered_motions.items()},
+    )
     for way, moved_values in ways.items():
-        columns = {name: (CHANNELS[name][1], values) for name, values in moved_values.items()}
+        columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
         write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
     channels = {
         name: Channel(("way", "time"), [moved_values[name] for moved_values in ways.values()], unit)
-        for name, (_, unit) in CHANNELS.items()
+        for name, (_, unit) in COMPARED_CHANNELS.items()
     }
     times = source.period * np.arange(len(source.readings))
     axes = {"way": Channel("way", list(ways)), "time": Channel("time", times, "s")}
     saved = result(scene, channels, axes, engine=source.name)
     assert source.quality is not None
     record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
-    with_assumptions(saved, assumptions(record, source.ways["integrated"]))
+    with_assumptions(saved, assumptions(record, source.recovered_motions["integrated"]))
     if scene.error:
         beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
         not_estimated(saved, f"noise and mounts err most, and {beside}")
@@ -232,21 +237,21 @@ def _numbers_of_ways(source: Source) -> dict[str, Any]:
     largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
     assert source.quality is not None
     ways = {}
-    for way, moved in source.ways.items():
-        errors = {name: values - source.truth.get(name, 0.0) for name, values in _values(moved).items()}
-        ways[way] = {name: [float(np.abs(error).max()), rms(error)] for name, error in errors.items()}
+    for way, moved in source.recovered_motions.items():
+        errors = {name: values - source.truth.get(name, 0.0) for name, values in _compared_values(moved).items()}
+        ways[way] = {name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()}
     told = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
     return {"source": source.name, **told, "ways": ways}
 
 
-def _lines(source: Source, p: Parameters) -> list[str]:
+def _screen_lines(source: Source, p: Parameters) -> list[str]:
     """Lines for the screen: the verdict on the readings, then the largest and rms error (or size) for each method."""
     assert source.quality is not None
     numbers, kind = _numbers_of_ways(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"
     lines = [
         f"  {source.name}",
-        f"    {_verdict(source.quality)}",
+        f"    {_rigidity_text(source.quality)}",
         f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}",
     ]
     for way, errors in numbers["ways"].items():
@@ -260,29 +265,37 @@ def _lines(source: Source, p: Parameters) -> list[str]:
     return lines
 
 
-def _verdict(quality: Quality) -> str:
+def _rigidity_text(quality: Quality) -> str:
     """Text on the consistency of the readings with rigid-body motion."""
     if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
     share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
     if quality.rigid:
-        return f"{share} (allowed: {100 * LIMIT:g} %, or what the noise leaves): the mounts pass for rigid"
+        return (
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %, or what the noise leaves): the mounts "
+            "pass for rigid"
+        )
     if quality.suspect:
-        return f"{share} (allowed: {100 * LIMIT:g} %): {quality.suspect!r} does not move with the body and is left out"
+        return (
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {quality.suspect!r} does not move "
+            "with the body and is left out"
+        )
     return (
-        f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way and no single sensor explains it, "
+        f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): the body or a mount gives way and no "
+        "single sensor explains it, "
         "or the noise is larger than the scene states (deviation)"
     )
 
 
-def _closing(options: Options) -> list[str]:
+def _closing_lines(options: Options) -> list[str]:
     """Closing lines on the time that the filters take, and on the damage error that a tilt causes."""
-    far = float(tilt_displacement(TILT, np.array([10.0]))[0])
+    far = float(tilt_displacement(TABLE_TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
         f"{options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
         "  it takes slow errors and true grades alike, and is least sure within one period of the ends.",
-        f"  A tilt error of {1e3 * TILT:g} mrad turns gravity into a false displacement of {far:.2g} m after 10 s, "
+        f"  A tilt error of {1e3 * TABLE_TILT:g} mrad turns gravity into a false displacement of "
+        f"{far:.2g} m after 10 s, "
         "four times that after 20 s.",
     ]
 
@@ -290,7 +303,7 @@ def _closing(options: Options) -> list[str]:
 def _figure(source: Source, results: Results, path: Path) -> None:
     """Plot pitch and heave for one source of readings, the error of each method where the true motion is known, and the
     misfit of the readings from rigid-body motion."""
-    from models.drawing.figures import COLUMN_WIDTH, GREY, heading, legend_below, save, subplot_mosaic
+    from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
 
     assert source.quality is not None
     times = source.period * np.arange(len(source.readings))
@@ -302,29 +315,33 @@ def _figure(source: Source, results: Results, path: Path) -> None:
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
     for axis in axes.values():
         axis.xaxis.set_tick_params(labelbottom=True)
-    ways = {way: _values(motion) for way, motion in source.ways.items()}
+    ways = {way: _compared_values(motion) for way, motion in source.recovered_motions.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
-        _motions(axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name)
+        _plot_motions(
+            axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name
+        )
         if source.truth:
             errors = {way: scale * np.abs(motion[name] - source.truth[name]) for way, motion in ways.items()}
-            _errors(
+            _plot_errors(
                 axes[f"{name} error"], times, errors, f"Largest error of the {name} so far {label[label.index('[') :]}"
             )
     axes["misfit"].plot(times, source.quality.misfit, color=GREY, linewidth=0.4)
     axes["misfit"].set_title(f"Readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s²]")
     axes["misfit"].set_xlabel("time [s]")
     legend_below(figure, axes["pitch error" if source.truth else "pitch"], columns=3)
-    heading(figure, f"Pitch and heave from accelerometers, {source.name}: what each way errs by", results)
+    add_heading(figure, f"Pitch and heave from accelerometers, {source.name}: what each way errs by", results)
     save(figure, path)
 
 
-def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str) -> None:
+def _plot_motions(
+    axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str
+) -> None:
     """Plot the true motion where it is known, since good methods would only cover it; else the motion by each
     method."""
-    from models.drawing.figures import TRUTH
+    from models.drawing.figures import TRUTH_COLOUR
 
     if source.truth:
-        axis.plot(times, (1e3 if name == "pitch" else 1.0) * source.truth[name], color=TRUTH)
+        axis.plot(times, (1e3 if name == "pitch" else 1.0) * source.truth[name], color=TRUTH_COLOUR)
         axis.set_title(f"True {title[0].lower()}{title[1:]}")
         return
     for way, values in ways.items():
@@ -332,7 +349,7 @@ def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: s
     axis.set_title(title)
 
 
-def _errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
+def _plot_errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
     """Plot the largest error of each method up to every time, on a logarithmic scale."""
     for way, error in errors.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)

@@ -15,15 +15,15 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.identification.held_out import Identified, Search, identified
+from models.identification.held_out import Identified, Search, identified_vehicle
 from models.identification.of_scene import SceneModel
-from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
+from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.scene import SingleTrackScene, build
-from studies.command.identify import as_dict, lines
+from studies.command.identify import as_dict, identification_lines
 
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
-AIMS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
+AIMED_ERRORS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
 """Rms error by the rms of the measurement that is asked for."""
 
 
@@ -45,7 +45,7 @@ class Options(Strict):
 
     def asked(self) -> list[str]:
         """Keys of the parameters to identify."""
-        return self.parameters or list(PARAMETERS if self.measurement else FITTED_PARAMETERS)
+        return self.parameters or list(IDENTIFIED_PARAMETERS if self.measurement else FITTED_PARAMETERS)
 
 
 FITTED_PARAMETERS = (
@@ -56,7 +56,7 @@ FITTED_PARAMETERS = (
     "rear.friction=0.3:3",
 )
 """What half a minute of driving determines; with all fifteen the search does not settle, and predicts badly."""
-SIMPLER: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
+SIMPLER_VEHICLES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
     "linear single track": ({"front.friction": 50.0, "rear.friction": 50.0}, ("stiffness", "yaw_inertia", "offset")),
     "six numbers": ({}, ("stiffness", "friction", "yaw_inertia", "steer_offset")),
 }
@@ -68,7 +68,7 @@ def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
     options = read(Options, scene.options, scene.file, "options")
     for name in ("measurement", "prediction"):
         if getattr(options, name):
-            _found(scene, getattr(options, name), f"options.{name}")
+            _data_file(scene, getattr(options, name), f"options.{name}")
     if options.prediction and not options.measurement:
         raise InputError(scene.file, "options.prediction", options.prediction, "needs options.measurement beside it")
 
@@ -78,17 +78,19 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     from studies.race_car_figure import draw
 
     options = read(Options, scene.options, scene.file, "options")
-    first, second = stretches(scene, options, folder)
-    chosen = identified(first, second, Search(options.asked(), list(AIMS), options.low_pass, options.blocks), progress)
-    others = {name: simpler(first, second, options, name, progress) for name in SIMPLER}
+    first, second = identification_and_test_scenes(scene, options, folder)
+    chosen = identified_vehicle(
+        first, second, Search(options.asked(), list(AIMED_ERRORS), options.low_pass, options.blocks), progress
+    )
+    others = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
     draw(chosen, others, scene.title, folder / "race_car.png")
-    solved = chosen.known.fit
+    solved = chosen.uncertainty.fit
     predicted = SceneModel(second, [each.name for each in solved.problem.parameters], "").result(solved.values)
     predicted.save(folder / "predicted.nc")
-    answer = figures(chosen)
-    answer["identified"] = as_dict(chosen.known)
+    answer = error_ratios(chosen)
+    answer["identified"] = as_dict(chosen.uncertainty)
     answer["simpler vehicles"] = {
-        name: dict(zip(AIMS, each.bands.relative(), strict=True)) for name, each in others.items()
+        name: dict(zip(AIMED_ERRORS, each.bands.relative_error(), strict=True)) for name, each in others.items()
     }
     answer["residuals"] = residual_correlations(chosen)
     return {
@@ -97,30 +99,36 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
         "failed": {},
         "answer": answer,
         "results": {"prediction": predicted},
-        "table": [*lines(chosen.known), *_told(chosen, others), *_wrong(answer["residuals"])],
+        "table": [
+            *identification_lines(chosen.uncertainty),
+            *_result_lines(chosen, others),
+            *_unmet_aims(answer["residuals"]),
+        ],
     }
 
 
-def stretches(scene: SingleTrackScene, options: Options, folder: Path) -> tuple[SingleTrackScene, SingleTrackScene]:
+def identification_and_test_scenes(
+    scene: SingleTrackScene, options: Options, folder: Path
+) -> tuple[SingleTrackScene, SingleTrackScene]:
     """Scenes of the section of the drive for identification and of the section for prediction; their measured drives
     are files in ``folder``."""
     if not options.measurement:
         whole, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
-        path = plain(_found(scene, options.measurement, "options.measurement"), folder / "measured.csv")
+        path = write_plain_table(_data_file(scene, options.measurement, "options.measurement"), folder / "measured.csv")
         whole = _scene_with_car(scene, path, RACE_CAR)
     if options.prediction:
-        other = plain(_found(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
+        other = write_plain_table(_data_file(scene, options.prediction, "options.prediction"), folder / "predicted.csv")
         return whole, _scene_with_car(scene, other, RACE_CAR)
     from models.measured.drive import read_drive
 
     times = read_drive(path).times
     middle = float(times[round(options.share * len(times))])
     ends = [float(times[0]), middle], [middle, float(times[-1])]
-    return tuple(_stretched(whole, end) for end in ends)  # type: ignore[return-value]
+    return tuple(_scene_of_section(whole, end) for end in ends)  # type: ignore[return-value]
 
 
-def _found(scene: SingleTrackScene, name: str, place: str) -> Path:
+def _data_file(scene: SingleTrackScene, name: str, place: str) -> Path:
     """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene resolves the name to."""
     data = os.environ.get("TWINRIG_DATA", "")
     return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, place)
@@ -132,25 +140,25 @@ def _scene_with_car(scene: SingleTrackScene, path: Path, car: dict[str, Any]) ->
     return build(table, scene.file, path.parent)
 
 
-def _stretched(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
+def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
     return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": ends}), "options": {}})
 
 
-def simpler(
+def identified_simpler(
     first: SingleTrackScene, second: SingleTrackScene, options: Options, name: str, progress: Progress
 ) -> Identified:
     """Identify and predict with a simpler vehicle: some of its parameters are fixed, and fewer are identified."""
-    holds, kept = SIMPLER[name]
+    holds, kept = SIMPLER_VEHICLES[name]
     parameters = [text for text in options.asked() if any(word in text for word in kept)]
-    few = Search(parameters, list(AIMS), options.low_pass, blocks=2)
+    few = Search(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
         progress(f"{name}: {text}", 0.95)
 
-    return identified(_with(first, holds), _with(second, holds), few, tell)
+    return identified_vehicle(_with_values(first, holds), _with_values(second, holds), few, tell)
 
 
-def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
+def _with_values(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
     from models.core.scene_file import set_key
 
     table = scene.table()
@@ -161,12 +169,16 @@ def _with(scene: SingleTrackScene, holds: dict[str, float]) -> SingleTrackScene:
     return build(table, scene.file, Path(scene.folder))
 
 
-def figures(identified: Identified) -> dict[str, Any]:
+def error_ratios(identified: Identified) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
     samples; half-width of the bands to the error."""
-    sizes = np.array([channel.size for channel in identified.known.fit.problem.channels])
-    crossed = np.sqrt(np.mean(identified.crossed**2, axis=1)) / sizes
-    inside, width, relative = identified.bands.inside(), identified.bands.width(), identified.bands.relative()
+    sizes = np.array([channel.size for channel in identified.uncertainty.fit.problem.channels])
+    crossed = np.sqrt(np.mean(identified.cross_validation_errors**2, axis=1)) / sizes
+    inside, width, relative = (
+        identified.bands.share_inside(),
+        identified.bands.width(),
+        identified.bands.relative_error(),
+    )
     return {
         name: {
             "error": float(relative[k]),
@@ -174,19 +186,19 @@ def figures(identified: Identified) -> dict[str, Any]:
             "half-width by error": float(width[k]),
             "error between parts": float(crossed[k]),
         }
-        for k, name in enumerate(AIMS)
+        for k, name in enumerate(AIMED_ERRORS)
     }
 
 
-def _told(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
+def _result_lines(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
-    for name, each in figures(chosen).items():
+    for name, each in error_ratios(chosen).items():
         table.append(
-            f"  {name:<26}{each['error']:>9.1%}{AIMS[name]:>8.0%}{each['inside']:>13.1%}"
+            f"  {name:<26}{each['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{each['inside']:>13.1%}"
             f"{each['half-width by error']:>12.2f}{each['error between parts']:>9.1%}"
         )
     for name, each in identified.items():
-        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMS, each.bands.relative(), strict=True))
+        errors = ", ".join(f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, each.bands.relative_error(), strict=True))
         table.append(f"  {name}: {errors}")
     return table
 
@@ -194,8 +206,8 @@ def _told(chosen: Identified, identified: dict[str, Identified]) -> list[str]:
 def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]:
     """For each channel, correlations of the residual and of its magnitude with accelerations, speed and braking of the
     car."""
-    problem = identified.known.fit.problem
-    model = problem.model.result(identified.known.fit.values)  # type: ignore[attr-defined]
+    problem = identified.uncertainty.fit.problem
+    model = problem.model.result(identified.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, ahead = (np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration"))
     speed = np.interp(clock, model.times, model.detail.speed)
@@ -210,11 +222,11 @@ def residual_correlations(identified: Identified) -> dict[str, dict[str, float]]
     }
     return {
         name: {cause: float(np.corrcoef(of(row), values)[0, 1]) for cause, (of, values) in causes.items()}
-        for name, row in zip(AIMS, identified.crossed, strict=True)
+        for name, row in zip(AIMED_ERRORS, identified.cross_validation_errors, strict=True)
     }
 
 
-def _wrong(residuals: dict[str, dict[str, float]]) -> list[str]:
+def _unmet_aims(residuals: dict[str, dict[str, float]]) -> list[str]:
     def told(causes: dict[str, float]) -> str:
         most = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
         return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in most)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.drawing.figures import BLUE, DARK, SKY, VERMILION, heading, save, subplots
+from models.drawing.figures import BLUE, DARK, SKY, VERMILION, add_heading, save, subplots
 
 if TYPE_CHECKING:
     from studies.race_car import Identified
 
-SECONDS = 60.0
+SECONDS_SHOWN = 60.0
 """s of the prediction that are shown."""
 
 
@@ -18,7 +18,7 @@ def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, 
     """Plot channels over time with their prediction bands, and below them the errors of all vehicles."""
     problem = chosen.bands.problem
     times = problem.clock.times
-    shown = times <= times[0] + SECONDS
+    shown = times <= times[0] + SECONDS_SHOWN
     figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6))
     for axis, channel, row, half in zip(
         axes, problem.channels, chosen.bands.predicted, chosen.bands.half_width, strict=False
@@ -35,10 +35,10 @@ def draw(chosen: "Identified", identified: dict[str, "Identified"], title: str, 
     vehicles = {"chosen": chosen, **identified}
     for i, (name, each) in enumerate(vehicles.items()):
         at = np.arange(len(names)) + 0.25 * i
-        axes[-1].bar(at, 100.0 * each.bands.relative(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
+        axes[-1].bar(at, 100.0 * each.bands.relative_error(), 0.22, color=(BLUE, VERMILION, SKY)[i % 3], label=name)
     axes[-1].set_xticks(np.arange(len(names)) + 0.25, names)
     axes[-1].set(ylabel="error [% of rms]", title="What simpler vehicles lose")
     axes[-1].legend()
     axes[0].legend(ncols=3)
-    heading(figure, title, {})
+    add_heading(figure, title, {})
     return save(figure, path)

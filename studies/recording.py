@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from models.core.finding import gathered, queries
+from models.core.finding import findings_as_dicts, merged_findings
 from models.core.strict import Strict, read
-from models.drift.score import rms
+from models.drift.score import root_mean_square
 from models.systems.measured.consequences import consequence_texts
-from models.systems.measured.run import WORK, Examination
+from models.systems.measured.run import WORK_FOLDER, Examination
 from models.systems.measured.run import run as run_scene
 from models.systems.measured.scene import MeasuredScene
 
-SYSTEM, BLOCKS = "measured", WORK
+SYSTEM, BLOCKS = "measured", WORK_FOLDER
 
 
 class Options(Strict):
@@ -36,41 +36,47 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     return {
         "scene": exam.scene.title,
         "folder": str(folder),
-        "failed": _failed(exam),
+        "failed": _failure_reasons(exam),
         "page": str(page),
-        "results": {exam.chosen: result},
+        "results": {exam.chosen_run: result},
         "verdicts": {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()},
         "effects": [str(consequence) for consequence in exam.consequences],
-        "findings": queries(finding for finding in exam.findings if finding.weight != "note"),
+        "findings": findings_as_dicts(finding for finding in exam.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in exam.findings),
-        "channels": _sizes(exam),
+        "channels": _force_sizes(exam),
         "table": [*_lines_of_findings(exam), f"  the page: {page}"],
     }
 
 
-def _failed(examination: Examination) -> dict[str, str]:
+def _failure_reasons(examination: Examination) -> dict[str, str]:
     """Reasons why the command ends with code 1: errors in the recording, or the failure of the run whose results were
     to be saved."""
-    if examination.stopped:
+    if examination.is_stopped:
         count = sum(finding.weight == "error" for finding in examination.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
     return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}
 
 
-def _sizes(examination: Examination) -> dict[str, Any]:
+def _force_sizes(examination: Examination) -> dict[str, Any]:
     """Largest magnitude and rms of each section force, as the numbers that a sweep plots."""
     sizes = dict[str, Any]()
     for answer, counted in examination.counted.items():
         assert examination.outcome is not None
-        largest = float(np.abs([counted.least, counted.greatest]).max())
-        sizes[answer.name] = {"unit": answer.unit, "max": largest, "rms": rms(examination.outcome.samples(answer))}
+        largest = float(np.abs([counted.smallest_load, counted.largest_load]).max())
+        sizes[answer.name] = {
+            "unit": answer.unit,
+            "max": largest,
+            "rms": root_mean_square(examination.outcome.samples(answer)),
+        }
     return sizes
 
 
 def _lines_of_findings(examination: Examination) -> list[str]:
     """Lines for the terminal: findings above a note, how each run ended, and the verdict on it."""
     lines = [
-        f"  {finding.weight}: {finding.text}" for finding in gathered(examination.findings) if finding.weight != "note"
+        f"  {finding.weight}: {finding.text}"
+        for finding in merged_findings(examination.findings)
+        if finding.weight != "note"
     ]
     notes = sum(finding.weight == "note" for finding in examination.findings)
     lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")

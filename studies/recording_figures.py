@@ -11,52 +11,52 @@ from models.core.finding import Finding
 from models.drawing.figures import (
     BLUE,
     COLUMN_WIDTH,
-    MEASURED,
+    CURVE_COLOURS,
+    MEASURED_COLOUR,
     PALE,
-    TRUTH,
-    TURNS,
+    TRUTH_COLOUR,
     VERMILION,
     YELLOW,
-    heading,
+    add_heading,
     save,
     subplots,
 )
-from models.fatigue.counting import Counted
+from models.fatigue.counting import CountedLoad
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
-from models.measured.signal import UNITS, Signal
-from models.systems.measured.holds import FREE
+from models.measured.signal import UNIT_OF_QUANTITY, Signal
+from models.systems.measured.holds import FREE_RUN
 from models.systems.measured.run import Examination
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
-from models.systems.measured.verdict import Compared, overlay
+from models.systems.measured.verdict import ChannelComparison, paired_channels
 from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
 MARKED_SECONDS, UNMARKED_SECONDS, MOST_SAMPLES = 0.6, 15.0, 20_000
 """s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""
 SHOWN_SIGNALS = 4
 """Signals drawn at the most."""
-TITLE = 60
+TITLE_LETTERS = 60
 """Letters of a place in a title."""
-POINTS = 1200
+CURVE_COLUMNS = 1200
 """Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
-LOUD, QUIET, MARK = VERMILION, TRUTH, YELLOW
-RUNS = {
-    "measured": ("measured", MEASURED),
-    "truth": ("truth", TRUTH),
-    FREE: ("free run", LOUD),
+LOUD_COLOUR, QUIET_COLOUR, MARK_COLOUR = VERMILION, TRUTH_COLOUR, YELLOW
+RUN_STYLES = {
+    "measured": ("measured", MEASURED_COLOUR),
+    "truth": ("truth", TRUTH_COLOUR),
+    FREE_RUN: ("free run", LOUD_COLOUR),
     "kalman": ("held by the Kalman filter", BLUE),
     "prescribed": ("held to the measured angles", BLUE),
 }
 """Label and colour of each run, and of what it is drawn beside."""
-WHEELS = TURNS[:6]
-KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
+WHEEL_COLOURS = CURVE_COLOURS[:6]
+CHECKS_OF_FAULT = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
 """Checks that tell a kind of fault."""
 
 
 def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     """Draw the figure that illustrates a finding into ``path``; None where there is nothing to draw."""
-    telling = (f for f in evidence.faults if finding.check in KINDS.get(f.kind, ()))
+    telling = (f for f in evidence.faults if finding.check in CHECKS_OF_FAULT.get(f.kind, ()))
     fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
@@ -64,22 +64,26 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     vertical, hubs = evidence.vertical(), evidence.vehicle.hubs if evidence.vehicle else ()
     loads = len(vertical) == len(hubs) > 0 and set(signals) <= set(vertical.values())
     if finding.check in ("weight", "gain", "sign", "unit") and loads:
-        return _means(evidence, path)
+        return _plot_mean_forces(evidence, path)
     if evidence.agreement is not None and fault is not None:
-        return _exchange(evidence, fault, path) if fault.kind == "swapped" else _ratio(evidence, fault, path)
-    return _spectrum(evidence, signals, path) if finding.check == "noise" else _times(finding, evidence, signals, path)
+        return _plot_exchange(evidence, fault, path) if fault.kind == "swapped" else _plot_ratio(evidence, fault, path)
+    return (
+        _plot_spectrum(evidence, signals, path)
+        if finding.check == "noise"
+        else _plot_signals(finding, evidence, signals, path)
+    )
 
 
-def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str = "outside upper right") -> Path:
+def _save_titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str = "outside upper right") -> Path:
     """Add a title and the legend of one axis to a figure, and save it."""
     if legend is not None:
         columns = 3 if "lower" in place else 2
         drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
-    heading(drawn, title)
+    add_heading(drawn, title)
     return save(drawn, path)
 
 
-def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_signals(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
     """Plot the signals of a finding over time, with the time span that the finding is about marked."""
     recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN_SIGNALS]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
@@ -90,24 +94,26 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
     drawn, axes = subplots(len(shown), 1, figsize=(COLUMN_WIDTH, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
     for axis, signal in zip(axes[:, 0], shown, strict=True):
         values = recording.columns.read(signal.name, first, last - first)[::every]
-        axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
-        axis.set_ylabel(f"{signal.name} [{UNITS[signal.quantity]}]")
+        axis.plot(times[: len(values)], values, color=QUIET_COLOUR, lw=0.8)
+        axis.set_ylabel(f"{signal.name} [{UNIT_OF_QUANTITY[signal.quantity]}]")
         if finding.check == "gravity" and signal.component == "z":
-            axis.axhline(GRAVITY if signal.gravity else 0.0, color=LOUD, ls="--", label="expected mean")
+            axis.axhline(GRAVITY if signal.gravity else 0.0, color=LOUD_COLOUR, ls="--", label="expected mean")
             axis.legend(loc="best")
         if marked:
-            axis.axvspan(*marked, color=MARK, alpha=0.5, lw=0)
+            axis.axvspan(*marked, color=MARK_COLOUR, alpha=0.5, lw=0)
         if finding.check == "clipped" and marked:
             axis.axhline(
                 float(recording.columns.read(signal.name, round(marked[0] / recording.period), 1)[0]),
-                color=LOUD,
+                color=LOUD_COLOUR,
                 ls="--",
             )
     axes[-1, 0].set_xlabel("time [s]" + ("; yellow: what is meant" if marked else ""))
-    return _titled(drawn, f"{shorten(finding.place or 'Recording', TITLE, placeholder=' ...')}: as recorded", path)
+    return _save_titled(
+        drawn, f"{shorten(finding.place or 'Recording', TITLE_LETTERS, placeholder=' ...')}: as recorded", path
+    )
 
 
-def _means(evidence: Evidence, path: Path) -> Path:
+def _plot_mean_forces(evidence: Evidence, path: Path) -> Path:
     """Bar chart of each hub's mean measured vertical force next to its static load by the vehicle file."""
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
@@ -115,17 +121,17 @@ def _means(evidence: Evidence, path: Path) -> Path:
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
     at = np.arange(len(hubs))
     axis.bar(at - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
-    bars = axis.bar(at + 0.2, means, 0.38, color=LOUD, label="mean of the recording")
+    bars = axis.bar(at + 0.2, means, 0.38, color=LOUD_COLOUR, label="mean of the recording")
     axis.bar_label(bars, [f"{part:+.2%}" if abs(part) < 0.5 else f"x {part + 1:.3g}" for part in means / loads - 1])
     axis.set_xticks(at, [f"{hub}\n{vertical[hub].name}" for hub in hubs])
     axis.set_ylabel("vertical force [N]")
     if np.abs(means).max() > 10 * loads.max():
         axis.set_yscale("symlog", linthresh=float(loads.max()))
     axis.margins(y=0.2)
-    return _titled(drawn, "Mean vertical forces", path, axis)
+    return _save_titled(drawn, "Mean vertical forces", path, axis)
 
 
-def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     """Plot the ratio of a channel's reading to its true value over frequency. A delay shows as a slope of the phase, a
     wrong factor as a constant magnitude."""
     agreement = evidence.agreement
@@ -145,18 +151,18 @@ def _ratio(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
         (axes[0], np.abs(ratio), np.abs(expected), 1.0),
         (axes[1], np.degrees(np.angle(ratio / expected)) + turned, turned, 0.0),
     ):
-        axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET, label="measured; larger: surer")
-        axis.plot(f, said, color=LOUD, label=told)
+        axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET_COLOUR, label="measured; larger: surer")
+        axis.plot(f, said, color=LOUD_COLOUR, label=told)
         axis.axhline(level, color=PALE, ls=":", label="as it should be")
     axes[0].set_ylabel("size [-]")
     axes[1].set_ylabel("phase [deg]")
     axes[0].set_ylim(0.0, 2 * max(abs(factor), 1.0))
     axes[1].set_xlabel("frequency [Hz]")
     title = f"{fault.name}: recorded by what the motion of the vehicle tells"
-    return _titled(drawn, title, path, axes[0], "outside lower center")
+    return _save_titled(drawn, title, path, axes[0], "outside lower center")
 
 
-def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
+def _plot_exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     """Bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
     exchanged."""
     agreement = evidence.agreement
@@ -164,15 +170,17 @@ def _exchange(evidence: Evidence, fault: MeasurementFault, path: Path) -> Path:
     names = [s.name for s in agreement.outputs]
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 1.4 + 0.24 * len(names)))
     at = np.arange(len(names))
-    axis.barh(at - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD, label="as mapped")
-    axis.barh(at + 0.2, 100 * agreement.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
+    axis.barh(at - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD_COLOUR, label="as mapped")
+    axis.barh(
+        at + 0.2, 100 * agreement.without(fault).unexplained, 0.38, color=QUIET_COLOUR, label=f"{fault.name} exchanged"
+    )
     axis.set_yticks(at, names)
     axis.invert_yaxis()
     axis.set_xlabel("what the hub forces leave unexplained of each reading [%]")
-    return _titled(drawn, "Exchanged hubs", path, axis)
+    return _save_titled(drawn, "Exchanged hubs", path, axis)
 
 
-def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
+def _plot_spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
     """Plot the power spectral density of signals and the noise density that is stated for them."""
     from scipy.signal import welch
 
@@ -184,18 +192,20 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
             np.where(np.isfinite(values), values, np.nanmean(values)), 1 / recording.period, nperseg=2048
         )
         axis.loglog(f[1:], np.sqrt(density[1:]), lw=0.9, label=signal.name)
-        stated = evidence.claimed.get(signal.name)
+        stated = evidence.stated_noise.get(signal.name)
         if stated:
-            axis.axhline(stated * np.sqrt(2 * recording.period), color=LOUD, ls="--", label=f"stated for {signal.name}")
+            axis.axhline(
+                stated * np.sqrt(2 * recording.period), color=LOUD_COLOUR, ls="--", label=f"stated for {signal.name}"
+            )
     axis.set_xlabel("frequency [Hz]")
-    axis.set_ylabel(f"spectral density [{UNITS[signals[0].quantity]} / sqrt(Hz)]")
-    return _titled(drawn, "Noise: where the spectrum goes flat", path, axis)
+    axis.set_ylabel(f"spectral density [{UNIT_OF_QUANTITY[signals[0].quantity]} / sqrt(Hz)]")
+    return _save_titled(drawn, "Noise: where the spectrum goes flat", path, axis)
 
 
-def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def thinned_curve(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times and values (m,) thinned for plotting: only the least and the greatest value of each short stretch of
     samples stay."""
-    width = len(times) // POINTS
+    width = len(times) // CURVE_COLUMNS
     if width < 3:
         return times, values
     rows = len(times) // width
@@ -207,7 +217,7 @@ def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.repeat(times[: rows * width : width], 2), both.ravel()
 
 
-def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
+def _panels_over_time(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
     """Figure with rows of panels over time."""
     drawn, panels = subplots(rows, figsize=(COLUMN_WIDTH, height), squeeze=False, **more)
     for panel in panels[-1] if more.get("sharex") else panels.flat:
@@ -218,13 +228,16 @@ def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
 def inputs_figure(examination: Examination, path: Path) -> Path:
     """Plot the forces at all hubs along each axis over time."""
     recording, axes = examination.recording, [a for a in "zxy" if examination.recording.find("force", component=a)]
-    drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
+    drawn, panels = _panels_over_time(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
     times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
         for i, hub in enumerate(examination.rig.hubs):
             for signal in (s for s in recording.find("force", hub, axis) if not s.check):
                 panel.plot(
-                    *thinned(times, recording.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7
+                    *thinned_curve(times, recording.samples(signal) / 1e3),
+                    color=WHEEL_COLOURS[i % len(WHEEL_COLOURS)],
+                    label=hub,
+                    lw=0.7,
                 )
         panel.set_title(f"Force on the hub along {axis} [kN]")
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(examination.rig.hubs))
@@ -235,18 +248,18 @@ def drift_figure(examination: Examination, path: Path) -> Path:
     """Plot roll and pitch of every run together with the measured angles and, for a virtual measurement, the true
     ones."""
     angles = examination.rig.angles
-    drawn, panels = _timed(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
+    drawn, panels = _panels_over_time(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
     for panel, angle in zip(panels[:, 0], angles, strict=True):
-        curves = _angles(examination, angle)
+        curves = _angles_of_runs(examination, angle)
         for name, (times, values) in curves.items():
-            label, colour = RUNS[name]
-            panel.plot(*thinned(times, np.degrees(values)), color=colour, label=label, lw=1.0)
-        if examination.drift is not None and examination.chosen != FREE and examination.chosen in curves:
-            about = np.interp(examination.drift.times, *curves[examination.chosen])
+            label, colour = RUN_STYLES[name]
+            panel.plot(*thinned_curve(times, np.degrees(values)), color=colour, label=label, lw=1.0)
+        if examination.drift is not None and examination.chosen_run != FREE_RUN and examination.chosen_run in curves:
+            about = np.interp(examination.drift.times, *curves[examination.chosen_run])
             spread = examination.drift.deviations[:, ("roll", "pitch").index(angle)]
             label = "free run as predicted, 1 standard deviation"
             bounds = np.degrees(about - spread), np.degrees(about + spread)
-            panel.fill_between(examination.drift.times, *bounds, color=LOUD, alpha=0.15, lw=0, label=label)
+            panel.fill_between(examination.drift.times, *bounds, color=LOUD_COLOUR, alpha=0.15, lw=0, label=label)
         panel.set_title(f"{angle} of the {examination.rig.chassis} [degrees]")
         low, high = panel.get_ylim()
         panel.set_ylim(max(-30.0, low), min(30.0, high))  # a run that topples must not squeeze all else to a line
@@ -254,7 +267,7 @@ def drift_figure(examination: Examination, path: Path) -> Path:
     return save(drawn, path)
 
 
-def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _angles_of_runs(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times (s) and values (rad) of an angle: as measured, in every run, and, for a virtual measurement, true."""
     recording, chassis = examination.recording, examination.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
@@ -269,13 +282,13 @@ def _angles(examination: Examination, angle: str) -> dict[str, tuple[np.ndarray,
 
 def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: Path, name: str = "") -> Path:
     """Plot up to six section forces over the complete recording, and each for two seconds about its largest range."""
-    times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
-    drawn, panels = _timed(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
+    times, colour = run.period * np.arange(run.done), RUN_STYLES.get(name, RUN_STYLES["kalman"])[1]
+    drawn, panels = _panels_over_time(len(answers), 1.7 * len(answers) + 0.5, columns=2, width_ratios=(2.4, 1))
     for (left, right), answer in zip(panels, answers, strict=True):
         values, unit, scale = run.samples(answer), f"k{answer.unit}", 1e-3
         if np.abs(values).max() < 1e3:
             unit, scale = answer.unit, 1.0
-        left.plot(*thinned(times, scale * values), color=colour, lw=0.7)
+        left.plot(*thinned_curve(times, scale * values), color=colour, lw=0.7)
         left.set_title(f"{answer.name} [{unit}]")
         near = np.abs(times - times[int(np.argmax(np.abs(values - values.mean())))]) <= 1.0
         right.plot(times[near], scale * values[near], color=colour)
@@ -283,12 +296,12 @@ def forces_figure(run: SectionOutcome, answers: Sequence[SectionChannel], path: 
     return save(drawn, path)
 
 
-def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
+def counting_figure(counted: dict[SectionChannel, CountedLoad], path: Path) -> Path:
     """Plot level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
-    for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
+    for colour, (answer, counts) in zip(WHEEL_COLOURS, counted.items(), strict=False):
         left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
-        right.plot(np.maximum(counts.pairs, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
+        right.plot(np.maximum(counts.pairs_of_range, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
     for panel, title, what in (
         (left, "level crossings, upwards", "level"),
         (right, "range pairs of at least", "range"),
@@ -301,18 +314,20 @@ def counting_figure(counted: dict[SectionChannel, Counted], path: Path) -> Path:
     return save(drawn, path)
 
 
-def overlay_figure(examination: Examination, run: SectionOutcome, compared: Sequence[Compared], path: Path) -> Path:
+def overlay_figure(
+    examination: Examination, run: SectionOutcome, compared: Sequence[ChannelComparison], path: Path
+) -> Path:
     """Plot measured channels that were not inputs of the run against the computed ones: over the whole time, and for
     two seconds about the largest error."""
-    drawn, panels = _timed(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
+    drawn, panels = _panels_over_time(len(compared), 1.7 * len(compared) + 0.7, columns=2, width_ratios=(2.4, 1))
     for (left, right), each in zip(panels, compared, strict=True):
-        times, measured, computed = overlay(examination.recording, run, each.signal, each.answer)
+        times, measured, computed = paired_channels(examination.recording, run, each.signal, each.answer)
         near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
         for values, colour, width, label in (
             (measured, PALE, 2.6, "measured"),
-            (computed, RUNS[examination.chosen][1], 0.8, "computed"),
+            (computed, RUN_STYLES[examination.chosen_run][1], 0.8, "computed"),
         ):
-            left.plot(*thinned(times, values), color=colour, lw=width, label=label)
+            left.plot(*thinned_curve(times, values), color=colour, lw=width, label=label)
             right.plot(times[near], values[near], color=colour, lw=width)
         left.set_title(f"{each.signal.name} [{each.answer.unit}]")
         right.set_title(f"About the largest error [{each.answer.unit}]", fontsize=8)

@@ -14,52 +14,62 @@ from models.core.discretisation import error_lines
 from models.core.result import Result
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from models.fatigue.damage import SLOPE
-from models.systems.measured.consequences import DAMAGE, FORCE
-from models.systems.measured.holds import FREE
+from models.fatigue.damage import WOEHLER_SLOPE
+from models.systems.measured.consequences import DAMAGE_LIMITS, FORCE_LIMITS
+from models.systems.measured.holds import FREE_RUN
 from models.systems.measured.run import Examination
 from models.systems.measured.section_run import SectionOutcome
-from models.systems.measured.verdict import DISAGREES, errors
+from models.systems.measured.verdict import LARGEST_DISAGREEMENT, errors_of_run
 from studies import recording_figures as draw
 
-TEMPLATE = "recording.html.jinja"
-NAMES = {FREE: "Free run", "kalman": "Run held by the Kalman filter", "prescribed": "Run held to measured angles"}
+PAGE_TEMPLATE = "recording.html.jinja"
+RUN_NAMES = {
+    FREE_RUN: "Free run",
+    "kalman": "Run held by the Kalman filter",
+    "prescribed": "Run held to measured angles",
+}
 NEGLIGIBLE_CHANGE = 1e-6
 """N, N m: what changes by less is rounding."""
-DRAWN = 6
+FORCES_DRAWN = 6
 """Section forces drawn at the most; all of them are in the table and in the files."""
 
 
 def write(examination: Examination, path: Path, result: Result) -> Path:
     """Write the page of a result, whole or not at all; returns its path."""
     with TemporaryDirectory() as folder:
-        text = page(examination, Path(folder), result)
+        text = page_text(examination, Path(folder), result)
     write_whole(path, text)
     return path
 
 
-def page(examination: Examination, folder: Path, result: Result) -> str:
+def page_text(examination: Examination, folder: Path, result: Result) -> str:
     """HTML text of the page, with the result's stated error and assumptions; figures are drawn into ``folder`` and
     embedded."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"as": format, "png": lambda path: base64.b64encode(path.read_bytes()).decode()}
     library = examination.engine if examination.engine != "reference" else "numpy"
-    return environment.get_template(TEMPLATE).render(
+    return environment.get_template(PAGE_TEMPLATE).render(
         exam=examination,
-        names=NAMES,
+        names=RUN_NAMES,
         errors=error_lines(result),
         breaches=[breach.line() for breach in broken_of(result)],
         assumed=assumed_of(result),
-        free=FREE,
+        free=FREE_RUN,
         weights=[finding.weight for finding in examination.findings],
         used=[(signal, examination.put_in(signal)) for signal in examination.recording.signals],
         effects={
-            finding: f" {each}." for each in examination.consequences if each.section for finding in [each.finding]
+            finding: f" {each}."
+            for each in examination.consequences
+            if each.section_force
+            for finding in [each.finding]
         },
-        figures=_figures(examination, folder),
-        limits={"disagrees": DISAGREES, "force": FORCE, "damage": DAMAGE},
+        figures=_page_figures(examination, folder),
+        limits={"disagrees": LARGEST_DISAGREEMENT, "force": FORCE_LIMITS, "damage": DAMAGE_LIMITS},
         forces=_forces(examination, examination.outcome, folder) if examination.outcome is not None else None,
-        sizes=[math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf for each in examination.compared],
+        sizes=[
+            math.sqrt(sum(band.measured**2 for band in each.bands)) or math.inf
+            for each in examination.channel_comparisons
+        ],
         files=[
             (source, examination.scene.path(source.file, f"files.{i}.file"))
             for i, source in enumerate(examination.scene.files)
@@ -71,7 +81,7 @@ def page(examination: Examination, folder: Path, result: Result) -> str:
     )
 
 
-def _figures(examination: Examination, folder: Path) -> dict[str, Any]:
+def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
     """Figures of the page: the input forces, every finding above a note that can be drawn, the drift of the runs, and
     measured channels that were not inputs of the run."""
     figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
@@ -82,9 +92,13 @@ def _figures(examination: Examination, folder: Path) -> dict[str, Any]:
     ]
     if examination.runs:
         figures["drift"] = draw.drift_figure(examination, folder / "drift.png")
-    if examination.outcome is not None and examination.compared:
-        shown = [each for each in examination.compared if each.signal.check] or examination.compared
-        figures["checks"] = draw.overlay_figure(examination, examination.outcome, shown[:DRAWN], folder / "checks.png")
+    if examination.outcome is not None and examination.channel_comparisons:
+        shown = [
+            each for each in examination.channel_comparisons if each.signal.check
+        ] or examination.channel_comparisons
+        figures["checks"] = draw.overlay_figure(
+            examination, examination.outcome, shown[:FORCES_DRAWN], folder / "checks.png"
+        )
     return figures
 
 
@@ -94,18 +108,20 @@ def _forces(examination: Examination, outcome: SectionOutcome, folder: Path) -> 
     moving = {
         answer: counts
         for answer, counts in examination.counted.items()
-        if counts.greatest - counts.least > NEGLIGIBLE_CHANGE
+        if counts.largest_load - counts.smallest_load > NEGLIGIBLE_CHANGE
     }
-    first, inside = list(moving)[:DRAWN], set(examination.rig.places.connectors)
+    first, inside = list(moving)[:FORCES_DRAWN], set(examination.rig.places.connectors)
     return {
-        "slope": SLOPE,
-        "true": errors(outcome, examination.virtual, SLOPE).damage if examination.virtual is not None else {},
+        "slope": WOEHLER_SLOPE,
+        "true": errors_of_run(outcome, examination.virtual, WOEHLER_SLOPE).damage
+        if examination.virtual is not None
+        else {},
         "moving": moving,
         "still": len(examination.counted) - len(moving),
         "first": len(first),
         "parts": [
             {a: counts for a, counts in moving.items() if (a.section in inside) is part} for part in (True, False)
         ],
-        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen),
+        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen_run),
         "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),
     }

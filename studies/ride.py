@@ -10,7 +10,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.result import Result, join_results
 from models.core.strict import Strict, quantity, read
-from models.core.told import inherited
+from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
 from models.ride.sweep import Sweep
@@ -25,7 +25,7 @@ from models.systems.ride.of_scene import (
     road_of,
     vehicle_of,
 )
-from models.systems.ride.plan import doubts, noise_sharing_text
+from models.systems.ride.plan import frequency_doubts, noise_sharing_text
 from models.systems.ride.readings import isotropic_change, largest_gap, static_loads
 from models.systems.ride.run import AS_WRITTEN, SweepPoints
 from models.systems.ride.scene import RideScene
@@ -35,21 +35,21 @@ from models.vehicles.spatial_linear import wheels
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
-SIMPLER = {
+SIMPLER_ROADS = {
     "axles independent": ("", "uncorrelated"),
     "axles alike": ("", "equal"),
     "tracks independent": ("uncorrelated", ""),
     "tracks alike": ("equal", ""),
 }
 """What is often assumed instead of the scene's own road: left and right, front and rear; empty as in the scene."""
-ISOTROPIC = "isotropic road"
-ROUNDING = 1e-13
+ISOTROPIC_ROAD = "isotropic road"
+ROUNDING_DEVIATION = 1e-13
 """Deviations below, in SI, are what rounding leaves of zero."""
 NEGLIGIBLE_OUTPUT = 1e-6
 """An output this much smaller than on another road is zero but for rounding: no change is given."""
 POINTS_ALONG_BODY = 13
 """Points along the body at which its vertical acceleration is drawn."""
-OVERHANG = 0.2
+OVERHANG_LENGTH = 0.2
 """How far (m) these points reach beyond the axles."""
 
 
@@ -85,7 +85,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     first, linear = sweeps[engines[0]], linear_vehicle(vehicle, engines[0])(speed)
     progress("figures", 0.7)
     top = Heading(scene.title, results)
-    _save(results, folder)
+    _save_deviations(results, folder)
     _save_system(scene, linear, speed, folder)
     if along := _with_points_along_body(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
@@ -100,13 +100,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     road, y = road_of(scene, there), half_track_of(scene, there)
     road_figure(road, y, fitted, top, folder / "road.png")
     texts = (road.label(y), *noise_sharing_text(scene, there), *(fitted.notes if fitted else ()))
-    notes = [*(f"  question: {text}" for text in doubts(vehicle)), *(f"  road: {text}" for text in texts)]
+    notes = [*(f"  question: {text}" for text in frequency_doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "answer": _answer(first),
+        "answer": _answer_of_ride(first),
         "table": [*_table(scene, vehicle, sweeps, speed, options), *notes],
     }
 
@@ -117,7 +117,7 @@ def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)
-        for name, (left_right, front_rear) in SIMPLER.items()
+        for name, (left_right, front_rear) in SIMPLER_ROADS.items()
         if len(sided) == 1 or left_right != "uncorrelated"
     }
 
@@ -129,33 +129,37 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     if not bodies or len(vehicle.axles) < 2:
         return None
     body = max(bodies, key=lambda body: body.mass)
-    places = np.linspace(vehicle.axles[-1] - OVERHANG, vehicle.axles[0] + OVERHANG, POINTS_ALONG_BODY)
+    places = np.linspace(vehicle.axles[-1] - OVERHANG_LENGTH, vehicle.axles[0] + OVERHANG_LENGTH, POINTS_ALONG_BODY)
     points = [(float(x), 0.0, body.position[2]) for x in places]
     outputs = [PointOutput(f"x = {p[0]:.2f} m", "acceleration", body.name, p, (0.0, 0.0, 1.0)) for p in points]
     return replace(vehicle, outputs=tuple(outputs))
 
 
-def _save(results: Mapping[str, Result], folder: Path) -> None:
+def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
     """Save the standard deviations of every engine over case, speed and output; the last speed is that of the
     tables."""
     whole = join_results(results, "engine")
-    saved = inherited(Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices")
+    saved = derived_result(
+        Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices"
+    )
     saved.save(folder / "deviations.nc")
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
 
 
 def _save_system(scene: RideScene, linear: LinearVehicle, speed: float, folder: Path) -> None:
     """Save the linear system at one speed for use in other programs."""
-    from models.ride.covariance import stationary
-    from models.ride.excited import excited
+    from models.ride.covariance import stationary_covariance
+    from models.ride.excited import vehicle_with_road
     from models.ride.export import save
-    from models.ride.weighting import weighted
+    from models.ride.weighting import system_with_weightings
 
-    system = weighted(excited(linear, excitation_of(scene, linear.wheels), speed), scene.weighting)
-    save(system, stationary(system), folder / "system")
+    system = system_with_weightings(
+        vehicle_with_road(linear, excitation_of(scene, linear.wheels), speed), scene.weighting
+    )
+    save(system, stationary_covariance(system), folder / "system")
 
 
-def _answer(sweep: Sweep) -> dict[str, Any]:
+def _answer_of_ride(sweep: Sweep) -> dict[str, Any]:
     """Standard deviation (SI) of each output at all speeds in the scene's own case; None in place of a value that is
     not finite."""
     return {
@@ -174,19 +178,19 @@ def _table(
     correlation."""
     (name, first), *others = sweeps.items()
     width = max(map(len, first.outputs))
-    heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC))
+    heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC_ROAD))
     lines = [f"  at {speed:g} m/s, standard deviations; then what other roads make of them", " " * (width + 24) + heads]
     alike = isotropic_change(scene, vehicle, speed)
     at, told = first.deviation[:, -1], list(zip(first.outputs, first.units, first.status[0, -1], strict=True))
     for i, (output, unit, status) in enumerate(told):
         value = _value_without_rounding(at[:, i])
         changes = (*at[1:, i], value * (1 + alike.get(output, np.nan)))
-        columns = "".join(f"{_change(other, value):>20}" for other in changes)
+        columns = "".join(f"{_change_text(other, value):>20}" for other in changes)
         lines.append(f"    {output:<{width}}{_text(value, unit, status):>20}{columns}")
     reasons = zip(told, first.reason[0, -1], strict=True)
     lines += [f"  {output} [{unit}]: {reason}" for (output, unit, status), reason in reasons if status != "finite"]
     deviations = dict(zip(first.outputs, at[0].tolist(), strict=True))
-    lines += _travels(vehicle, deviations, options.free_travel) + _loads(vehicle, deviations)
+    lines += _travel_lines(vehicle, deviations, options.free_travel) + _loads(vehicle, deviations)
     for engine, other in others:
         same = "" if (other.status == first.status).all() else "; but what is finite differs"
         lines.append(
@@ -200,7 +204,7 @@ def _value_without_rounding(deviations: np.ndarray) -> float:
     """The scene's own of the standard deviations (cases,), or 0 if it is rounding of a value that vanishes by
     symmetry."""
     largest = np.max(deviations, initial=0.0, where=np.isfinite(deviations))
-    return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING) else 0.0
+    return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING_DEVIATION) else 0.0
 
 
 def _text(value: float, unit: str, status: str) -> str:
@@ -210,7 +214,7 @@ def _text(value: float, unit: str, status: str) -> str:
     return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"
 
 
-def _change(other: float, value: float) -> str:
+def _change_text(other: float, value: float) -> str:
     return (
         f"{100 * (other / value - 1):+.1f} %"
         if np.isfinite(other) and NEGLIGIBLE_OUTPUT * other < value < np.inf
@@ -218,7 +222,7 @@ def _change(other: float, value: float) -> str:
     )
 
 
-def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
+def _travel_lines(vehicle: SpatialVehicle, deviations: Mapping[str, float], free_travel: float | None) -> list[str]:
     """Lines on the share of time for which each suspension travel exceeds the free travel (m). The number of
     exceedances per hour is added if the vehicle file has the travel rate as an output."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]

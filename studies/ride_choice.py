@@ -8,27 +8,27 @@ from typing import Any
 import numpy as np
 
 from models.advice.choice.systems.ride import opened
-from models.advice.ride_choice.activity import activity
+from models.advice.ride_choice.activity import activity_by_element
 from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.in_time import Samples
-from models.advice.ride_choice.reduced_files import SCENE, write
+from models.advice.ride_choice.reduced_files import SCENE_FILE_NAME, write
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import read
-from models.core.told import inherited
+from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import goes_in_time, scene_errors
-from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
+from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
 from models.systems.ride.scene import RideScene
 from studies.choice import save_choices
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
 
-LOWEST, HIGHEST = 1e-4, 1e3
+LOWEST_CHANGE, HIGHEST_CHANGE = 1e-4, 1e3
 """Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
-ELEMENTS = 12
+ELEMENTS_DRAWN = 12
 """Elements whose activity is drawn, the most active first."""
 
 
@@ -42,9 +42,9 @@ class EffectAlone:
     be left out (else empty)."""
 
     effect: Effect
-    predicted: np.ndarray
-    confirmed: np.ndarray
-    illegal: str
+    predicted_change: np.ndarray
+    confirmed_change: np.ndarray
+    refusal_reason: str
 
 
 def check(scene: RideScene, engines: tuple[str, ...]) -> None:
@@ -73,26 +73,26 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         chooser = Chooser.of(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
-        further = chooser.further(frozenset(choice.left_out))
+        further = chooser.change_if_left_out_too(frozenset(choice.left_out))
         alone = [_effect_alone(chooser, effect) for effect in chooser.effects]
-        watts = activity(chooser.full_scenes[len(chooser.full_scenes) // 2])
+        watts = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
     progress("what is left", 0.9)
-    results = _runs(scene, chooser.rest(frozenset(choice.left_out)))
-    _save(scene, alone, choice, watts, (results, chooser.counts), folder)
+    results = _deviation_results(scene, chooser.rest(frozenset(choice.left_out)))
+    _save_effect_table(scene, alone, choice, watts, (results, chooser.counts), folder)
     choice_figure(scene, alone, choice, watts, results, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "results": results,
-        "answer": _answer(scene, choice, further),
+        "answer": _answer_of_choice(scene, choice, further),
         "table": _table(scene, choice, alone, further),
     }
 
 
-def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
+def _deviation_results(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     """Standard deviations in the complete scene and in the reduced one, as results with their errors and
     assumptions."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
@@ -104,16 +104,18 @@ def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
 
 def _effect_alone(chooser: Chooser, effect: Effect) -> EffectAlone:
     single = frozenset([effect])
-    return EffectAlone(effect, chooser.predicted(single), chooser.solved(single), illegal(single))
+    return EffectAlone(
+        effect, chooser.predicted_changes(single), chooser.changes_by_modes(single), refusal_reason(single)
+    )
 
 
-def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
+def _answer_of_choice(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) -> dict[str, Any]:
     """Plain values of a ride's choice: its effects, their changes and the saving."""
     columns = {
-        "predicted": choice.predicted,
-        "confirmed": choice.confirmed,
-        "between speeds": choice.between,
-        "parameters off": choice.off,
+        "predicted": choice.predicted_change,
+        "confirmed": choice.confirmed_change,
+        "between speeds": choice.change_between_speeds,
+        "parameters off": choice.change_with_parameters_off,
     }
     errors = {
         name: {key: float(values[i]) for key, values in columns.items()} for i, name in enumerate(scene.quantities)
@@ -123,17 +125,17 @@ def _answer(scene: RideScene, choice: RideChoice, further: dict[Effect, float]) 
         "stay": [effect.name for effect in choice.candidates if effect not in choice.left_out],
         "errors": errors,
         "kept": choice.within_tolerance,
-        "states": [choice.before.states, choice.after.states],
-        "step": [choice.before.step, choice.after.step],
-        "step limit": list(choice.stable),
-        "calls": [choice.before.calls, choice.after.calls],
+        "states": [choice.cost_before.states, choice.cost_after.states],
+        "step": [choice.cost_before.step, choice.cost_after.step],
+        "step limit": list(choice.stable_steps),
+        "calls": [choice.cost_before.calls, choice.cost_after.calls],
         "said": list(choice.said),
-        "confirmations": choice.rounds,
+        "confirmations": choice.confirmations,
         "would matter no more above": {effect.name: change for effect, change in further.items()},
     }
 
 
-def _save(
+def _save_effect_table(
     scene: RideScene,
     single_effects: list[EffectAlone],
     choice: RideChoice,
@@ -148,10 +150,10 @@ def _save(
     results, counts = runs
     told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in single_effects]}
     changes = {
-        part: np.array([getattr(each, part) for each in single_effects]).reshape(-1, len(scene.quantities))
+        part: np.array([getattr(each, f"{part}_change") for each in single_effects]).reshape(-1, len(scene.quantities))
         for part in ("predicted", "confirmed")
     }
-    effects, why = [each.effect.name for each in single_effects], [each.illegal for each in single_effects]
+    effects, why = [each.effect.name for each in single_effects], [each.refusal_reason for each in single_effects]
     channels = {part: Channel(("effect", "quantity"), values, "1") for part, values in changes.items()}
     channels |= {"left_out": Channel("effect", told["left out"]), "not_alone_because": Channel("effect", why)}
     axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
@@ -160,9 +162,9 @@ def _save(
         channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
         {name: Channel(name, values) for name, values in axes.items()},
         engine="reference",
-        counts={"confirmations": choice.rounds} | counts,
+        counts={"confirmations": choice.confirmations} | counts,
     )
-    inherited(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
+    derived_result(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
     told |= {
         f"{name}, {part} [-]": values[:, i]
         for i, name in enumerate(scene.quantities)
@@ -184,48 +186,48 @@ def choice_figure(
 ) -> None:
     """Plot the changes by leaving out each effect alone and all together, with the tolerance, and the energy activity
     of each element."""
-    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, save, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in single_effects]
-    heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS
+    heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS_DRAWN
     figure, (above, below) = subplots(2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights)
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
         for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
-            changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*single_effects, choice)]))
-            shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST), LOWEST, HIGHEST)
+            changes = 100 * abs(np.array([getattr(row, f"{part}_change")[i] for row in (*single_effects, choice)]))
+            shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST_CHANGE), LOWEST_CHANGE, HIGHEST_CHANGE)
             above.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
     above.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
     above.set(
         xscale="log",
-        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        xlim=(LOWEST_CHANGE / 1.5, HIGHEST_CHANGE * 1.5),
         yticks=y,
         yticklabels=[*names, "all that is left out"],
         xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
         title="What leaving out an effect changes",
     )
     above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    _activity(below, watts)
-    heading(figure, scene.title, results)
+    _plot_activity(below, watts)
+    add_heading(figure, scene.title, results)
     save(figure, path)
 
 
-def _activity(axis: Any, watts: dict[str, float]) -> None:
+def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
     """Bar chart of each element's share of the mean power, from the activities ``watts`` (W). Inertias under white
     noise are left out, as their activity is not finite."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     total = sum(finite.values())
-    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     without = [name for name in watts if name not in finite]
     note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 
 
-def percent(value: float) -> str:
+def percent_text(value: float) -> str:
     """A relative change as text, in per cent."""
     digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
     return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
@@ -241,33 +243,41 @@ def _table(
     stay = [effect.name for effect in choice.candidates if effect not in choice.left_out]
     lines += [f"  stays: {', '.join(stay) or 'nothing'}", *(f"    {why}" for why in choice.said)]
     for i, name in enumerate(scene.quantities if choice.left_out else ()):
-        told = map(percent, (choice.predicted[i], choice.confirmed[i], choice.between[i], choice.off[i]))
+        told = map(
+            percent_text,
+            (
+                choice.predicted_change[i],
+                choice.confirmed_change[i],
+                choice.change_between_speeds[i],
+                choice.change_with_parameters_off[i],
+            ),
+        )
         lines.append(
             "  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
             "5 % off; tolerance {}".format(name, *told, tolerance)
         )
-    lines += saving(choice, tolerance)
+    lines += saving_lines(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [
-        f"    {single.effect.name}: {', '.join(map(percent, single.confirmed))}"
-        + (f" ({single.illegal})" if single.illegal else "")
+        f"    {single.effect.name}: {', '.join(map(percent_text, single.confirmed_change))}"
+        + (f" ({single.refusal_reason})" if single.refusal_reason else "")
         for single in single_effects
     ]
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"
         matters = "  {} would matter no more at a tolerance above {:.3g} %"
         lines.append((idle if change <= (scene.tolerance or 0) else matters).format(effect.name, 100 * change))
-    worst = float(max(abs(choice.off).max(), abs(choice.between).max()))
+    worst = float(max(abs(choice.change_with_parameters_off).max(), abs(choice.change_between_speeds).max()))
     return [*lines, f"  the choice holds for tolerances down to {100 * worst:.3g} %"] if choice.left_out else lines
 
 
-def saving(choice: RideChoice, tolerance: str) -> list[str]:
+def saving_lines(choice: RideChoice, tolerance: str) -> list[str]:
     """Text on steps and calls at equal accuracy before and after the choice."""
-    before, after = choice.before, choice.after
+    before, after = choice.cost_before, choice.cost_after
     lines = [
         f"  a run confirms {1e3 * before.step:.3g} ms as the longest step of the classical Runge-Kutta method "
         f"that keeps standard deviations within {tolerance} of the exact ones: {before.calls:.4g} calls per "
-        f"second of motion (stable up to {1e3 * choice.stable[0]:.3g} ms)"
+        f"second of motion (stable up to {1e3 * choice.stable_steps[0]:.3g} ms)"
     ]
     if not choice.left_out:
         return [*lines, "  nothing that may be left out saves calls"]
@@ -275,8 +285,9 @@ def saving(choice: RideChoice, tolerance: str) -> list[str]:
         *lines,
         "  without what is left out, changes and steps together keep the same in steps of "
         f"{1e3 * after.step:.3g} ms: {after.calls:.4g} calls, {before.calls / after.calls:.3g} times fewer at "
-        f"equal accuracy (stable up to {1e3 * choice.stable[1]:.3g} ms); states {before.states} -> {after.states}",
-        f"  {SCENE} beside the results runs what is left",
+        f"equal accuracy (stable up to {1e3 * choice.stable_steps[1]:.3g} ms); states {before.states} "
+        f"-> {after.states}",
+        f"  {SCENE_FILE_NAME} beside the results runs what is left",
     ]
 
 

@@ -11,11 +11,11 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
-from models.core.told import inherited
+from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.machine.seconds import cost
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.readings import largest_errors
@@ -27,13 +27,13 @@ from models.vehicles.vehicle_file import load_vehicle
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
-ROADS = {
+ROADS_BY_KNOWLEDGE = {
     "one track": ("equal", "delayed"),
     "two tracks, axles independent": ("modelled", "uncorrelated"),
     "two tracks, delay": ("modelled", "delayed"),
 }
 """Roads by how much they know: left and right, front and rear."""
-REPEATS = 5
+TIMING_REPEATS = 5
 """Timings of a point, interleaved."""
 Errors = dict[tuple[str, str], np.ndarray]
 """Largest relative error of every output by model and road."""
@@ -68,10 +68,10 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
     check(scene, engines)
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
-    models, results = _named([*_simpler_vehicles(scene), full]), dict[str, Result]()
+    models, results = _vehicles_by_name([*_simpler_vehicles(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
-        roads = {road: ROADS[road] for road in _roads(vehicle)}
+        roads = {road: ROADS_BY_KNOWLEDGE[road] for road in _roads(vehicle)}
         points = SweepPoints(correlations=roads)
         results[name] = run_scene(plain, "reference", vehicle=vehicle, points=points, error=scene.error)
     sweeps = {name: run.detail for name, run in results.items()}
@@ -82,8 +82,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         for model, sweep in sweeps.items()
         for i, road in enumerate(sweep.cases)
     }
-    costs = _costs(scene, models)
-    _save(scene, errors, names, results, folder)
+    costs = _computing_times(scene, models)
+    _save_errors(scene, errors, names, results, folder)
     middle = {name: float(np.median(seconds)) for name, seconds in costs.items()}
     detail_figure(errors, names, middle, Heading(scene.title, results), folder / "detail.png")
     answer = {
@@ -111,7 +111,7 @@ def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in names]
 
 
-def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
+def _vehicles_by_name(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
     """Vehicles under names such as "7 freedoms"; the file's name is added where two vehicles have the same number of
     freedoms."""
     counts = [len(vehicle.coordinates()) for vehicle in vehicles]
@@ -124,28 +124,30 @@ def _named(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
 def _roads(vehicle: SpatialVehicle) -> list[str]:
     """Kinds of road whose effect on a vehicle can differ: all, or "one track" for a vehicle whose wheels all lie in its
     middle."""
-    return list(ROADS) if any(wheel.y for wheel in wheels(vehicle)) else ["one track"]
+    return list(ROADS_BY_KNOWLEDGE) if any(wheel.y for wheel in wheels(vehicle)) else ["one track"]
 
 
-def _costs(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
-    """Computing times (s), REPEATS for each vehicle, to solve for the covariance at one speed. The vehicles take
+def _computing_times(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, list[float]]:
+    """Computing times (s), TIMING_REPEATS for each vehicle, to solve for the covariance at one speed. The vehicles take
     turns."""
     assert scene.speeds is not None
     speed = float(scene.speeds.all()[0])
     systems = {
-        name: excited(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
+        name: vehicle_with_road(linear_vehicle(vehicle)(speed), excitation_of(scene, wheels(vehicle)), speed)
         for name, vehicle in models.items()
     }
     seconds: dict[str, list[float]] = {name: [] for name in systems}
-    for _ in range(REPEATS):
+    for _ in range(TIMING_REPEATS):
         for name, system in systems.items():
             start = time.perf_counter()
-            stationary(system)
+            stationary_covariance(system)
             seconds[name].append(time.perf_counter() - start)
     return seconds
 
 
-def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path) -> None:
+def _save_errors(
+    scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path
+) -> None:
     """Save relative errors: a row per output, a column per model and road; empty where a model lacks the output."""
     heads = [f"{model}, {road}" for model, road in errors]
     saved = result(
@@ -154,7 +156,7 @@ def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[s
         {"output": Channel("output", names), "model": Channel("model", heads)},
         engine="reference",
     )
-    inherited(saved, results, "the deviations of which they are ratios").save(folder / "errors.nc")
+    derived_result(saved, results, "the deviations of which they are ratios").save(folder / "errors.nc")
     table = saved.data["error"].to_pandas().rename(columns=lambda head: f"{head} [-]")
     write_whole(folder / "errors.csv", table.to_csv())
 

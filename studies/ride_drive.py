@@ -59,7 +59,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": {},
         "results": {engine: result},
-        "answer": _answer(drive, alone),
+        "answer": _answer_of_drive(drive, alone),
         "table": [f"  linear vehicle of {engine}", *_table(drive, alone, units)],
     }
 
@@ -68,7 +68,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
+def _answer_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
     gaps = quasi_stationary_gaps(drive, quasi_stationary)
     finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]

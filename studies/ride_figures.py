@@ -19,16 +19,16 @@ from models.drawing.figures import (
     SKY,
     SMALL_TEXT,
     VERMILION,
-    heading,
+    add_heading,
     legend_below,
     panels,
     save,
     subplots,
-    wrapped,
+    wrapped_text,
 )
 from models.drawing.figures import COLOURS as ENGINES
 from models.ride.frequency import one_sided
-from models.ride.statistical_linearisation import GRADES
+from models.ride.statistical_linearisation import ERROR_GRADES
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
 from models.road.excitation import Excitation
@@ -39,9 +39,9 @@ from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
-COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
+CORRELATION_COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
 """One colour per correlation: the scene's own, then two of the axles and two of the tracks."""
-STYLES = ("-", "--", ":", "--", ":")
+CORRELATION_STYLES = ("-", "--", ":", "--", ":")
 
 
 class Heading(NamedTuple):
@@ -59,9 +59,9 @@ def along_figure(
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     name = _middle_acceleration(vehicle)
     for i, case in enumerate(at.cases):
-        left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
+        left.plot(places, at.deviation[i, 0], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i], label=case)
         if name:
-            right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
+            right.plot(over.speeds[:-1], over.of(case, name)[:-1], CORRELATION_STYLES[i], color=CORRELATION_COLOURS[i])
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
     left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body, {speed:g} m/s")
@@ -70,7 +70,7 @@ def along_figure(
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
         _say_where_none(axis)
     legend_below(figure, left, columns=2)
-    _save(figure, heading, ": which correlations of the road matter where", path)
+    _save_figure(figure, heading, ": which correlations of the road matter where", path)
 
 
 def _middle_acceleration(vehicle: SpatialVehicle) -> str:
@@ -97,7 +97,7 @@ def outputs_figure(
         what = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
         names = [name for name, unit_of in zip(swept.outputs, kinds, strict=True) if unit_of == (kind, si)]
         curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
-        for label, values in _distinct(curves).items():
+        for label, values in _distinct_curves(curves).items():
             axis.plot(
                 swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NO_FINITE_VARIANCE
             )
@@ -106,7 +106,7 @@ def outputs_figure(
         axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
         _say_where_none(axis)
         _name_below(axis)
-    _save(figure, heading, ": standard deviations over speed", path)
+    _save_figure(figure, heading, ": standard deviations over speed", path)
 
 
 def _say_where_none(axis: Axes) -> None:
@@ -120,7 +120,7 @@ def _unit_text(unit: str) -> str:
     return unit.replace("^2", "²")
 
 
-def _squared(unit: str) -> str:
+def _squared_unit(unit: str) -> str:
     """The square of a unit as text, with brackets around a unit of several symbols."""
     return f"{unit}²" if unit.isalpha() else f"({_unit_text(unit)})²"
 
@@ -130,7 +130,7 @@ def _shown_unit(unit: str) -> tuple[str, float]:
     return ("mm", 1e3) if unit == "m" else (_unit_text(unit), 1.0)
 
 
-def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Curves by name; curves that coincide, mostly those of left and right, become one curve with both names."""
     groups: list[tuple[list[str], np.ndarray]] = []
     for name, values in curves.items():
@@ -156,13 +156,13 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
-        for label, values in _distinct(curves).items():
+        for label, values in _distinct_curves(curves).items():
             axis.loglog(frequency, values, label=label)
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
         _name_below(axis)
-    _save(figure, heading, f": spectra at {speed:g} m/s", path)
+    _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading: Heading, path: Path) -> None:
@@ -183,7 +183,7 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, heading
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
     legend_below(figure, left, right, columns=3)
-    _save(figure, heading, ": the road", path)
+    _save_figure(figure, heading, ": the road", path)
 
 
 def detail_figure(
@@ -195,7 +195,7 @@ def detail_figure(
 ) -> None:
     """Table of colours with the errors of all outputs by model and road, and the cost of a covariance."""
     share = 0.66 * COLUMN_WIDTH / len(errors)
-    heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
+    heads = [wrapped_text(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL_TEXT) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
@@ -205,7 +205,7 @@ def detail_figure(
             axis.text(
                 j,
                 i,
-                _signed(float(values[i, j])),
+                _signed_text(float(values[i, j])),
                 ha="center",
                 va="center",
                 fontsize=SMALL_TEXT,
@@ -216,10 +216,10 @@ def detail_figure(
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
     what = "largest error of each standard deviation [%], and the time of one covariance"
-    _save(figure, heading, f"\n{what.capitalize()}", path)
+    _save_figure(figure, heading, f"\n{what.capitalize()}", path)
 
 
-def _signed(percent: float) -> str:
+def _signed_text(percent: float) -> str:
     """Text of a whole number with its sign; no sign for zero."""
     return f"{percent:+.0f}" if round(percent) else "0"
 
@@ -242,7 +242,7 @@ def drive_figure(
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         columns = {name: varied.names.index(name) for name in drawn_outputs if kinds[name] == (kind, unit)}
         pairs = {name: np.concatenate([varied.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()}
-        for label, both in _distinct(pairs).items():
+        for label, both in _distinct_curves(pairs).items():
             exact, quasi = np.split(both, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
                 axis.plot([], label=label + NO_FINITE_VARIANCE)
@@ -253,7 +253,7 @@ def drive_figure(
         _name_below(axis, 0.03)
     axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    _save(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
+    _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST_OUTPUTS = 12
@@ -268,12 +268,14 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
     left = answer.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
-        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color=GREY, label="slopes at rest (small motion)")
-        told = "statistical linearisation" + (", tyres on the road" if answer.lifts else "")
-        deviation, poor = factor * answer.deviation[:, i], left[:, i] > GRADES[-1][0]
-        axis.plot(answer.speeds, deviation, color=COLOURS[1], label=told)
+        axis.plot(
+            answer.speeds, factor * answer.small_motion[:, i], "--", color=GREY, label="slopes at rest (small motion)"
+        )
+        told = "statistical linearisation" + (", tyres on the road" if answer.tyres_may_lift else "")
+        deviation, poor = factor * answer.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
+        axis.plot(answer.speeds, deviation, color=CORRELATION_COLOURS[1], label=told)
         told = "no longer good by its own measure"
-        axis.plot(answer.speeds[poor], deviation[poor], "o", color=COLOURS[1], fillstyle="none", label=told)
+        axis.plot(answer.speeds[poor], deviation[poor], "o", color=CORRELATION_COLOURS[1], fillstyle="none", label=told)
         for j, (speed, copies) in enumerate(answer.copies.items()):
             spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
             axis.errorbar(
@@ -284,13 +286,13 @@ def nonlinear_figure(answer: Nonlinear, heading: Heading, path: Path) -> None:
                 color=VERMILION,
                 markersize=4,
                 capsize=3,
-                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.lifts else ""),
+                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.tyres_may_lift else ""),
             )
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
     legend_below(figure, *axes, columns=2)
-    _save(figure, heading, "\nStandard deviations over speed", path)
+    _save_figure(figure, heading, "\nStandard deviations over speed", path)
 
 
 def engine_spectra_figure(
@@ -309,10 +311,10 @@ def engine_spectra_figure(
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
         output, top = linear.outputs[i], expected[:, i].max()
-        unit = f"one-sided density [{_squared(output.unit)}/Hz]"
+        unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
-    _save(figure, heading, f"\nSpectra at {speed:g} m/s", path)
+    _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", path)
 
 
 def _few_panels(count: int) -> tuple[Figure, list[Axes]]:
@@ -328,6 +330,6 @@ def _name_below(axis: Axes, drop: float = 0.18) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 
-def _save(figure: Figure, plot_heading: Heading, text: str, path: Path) -> None:
-    heading(figure, plot_heading.title + text, plot_heading.results)
+def _save_figure(figure: Figure, plot_heading: Heading, text: str, path: Path) -> None:
+    add_heading(figure, plot_heading.title + text, plot_heading.results)
     save(figure, path)

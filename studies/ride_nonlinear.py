@@ -78,7 +78,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "folder": str(folder),
         "failed": failed,
         "results": results,
-        "answer": _answer(answer),
+        "answer": _answer_of_ride(answer),
         "table": _table(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
         + _time_table(runs, answer, road, speed),
@@ -89,13 +89,13 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _answer(answer: Nonlinear) -> dict[str, Any]:
+def _answer_of_ride(answer: Nonlinear) -> dict[str, Any]:
     """Standard deviation and mean (SI) of each output at all speeds; None in place of a value that is not finite. For
     tyres that lift they are those of the Monte Carlo copies, at the copies' speeds."""
     copies = list(answer.copies.values())
-    out: dict[str, Any] = {"speed": list(answer.copies) if answer.lifts else answer.speeds.tolist()}
+    out: dict[str, Any] = {"speed": list(answer.copies) if answer.tyres_may_lift else answer.speeds.tolist()}
     for key, on_road in (("deviation", answer.deviation), ("mean", answer.of("mean"))):
-        values = np.array([getattr(each, key) for each in copies]) if answer.lifts else on_road
+        values = np.array([getattr(each, key) for each in copies]) if answer.tyres_may_lift else on_road
         out[key] = {
             name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
             for i, name in enumerate(answer.shown.covariance.names)
@@ -108,14 +108,14 @@ def _table(answer: Nonlinear, speed: float) -> list[str]:
     linear vehicles relative to them."""
     lines, shown = [f"  at {speed:g} m/s"], answer.shown
     for name, spring in shown.springs.items():
-        k, c = spring.gains
+        k, c = spring.equivalent_gains
         lines.append(
             f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
             f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm"
         )
-    if not answer.lifts:
+    if not answer.tyres_may_lift:
         lines += [f"    {sentence}" for sentence in shown.sentences]
-    lines.append(f"    gains found in {len(shown.changes)} iterations, to {shown.distance:.0e}")
+    lines.append(f"    gains found in {len(shown.gain_changes)} iterations, to {shown.fixed_point_distance:.0e}")
     for beside, copies in answer.copies.items():
         lines.append(
             f"  at {beside:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
@@ -135,7 +135,7 @@ def _errors_at_speed(answer: Nonlinear, speed: float, i: int) -> str:
     if not len(at):
         return ""
     true = answer.copies[speed].deviation[i]
-    small, replaced = (100 * (values[at[0], i] / true - 1) for values in (answer.small, answer.deviation))
+    small, replaced = (100 * (values[at[0], i] / true - 1) for values in (answer.small_motion, answer.deviation))
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.systems.pitch_plane.plan import doubt_lines, trust_line
+from models.systems.pitch_plane.run import channel_summary
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.run import summary
-from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.vehicles.pitch_plane import STATE_NAMES
 
 Progress = Callable[[str, float], None]
@@ -31,7 +31,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             continue
         results[engine].save(folder / f"{engine}.nc")
     progress("figure", 1.0)
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     if results:
         _figure(scene, results, folder / "states.png")
     texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
@@ -42,7 +42,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "runs": {engine: _line(result) for engine, result in results.items()},
         "failed": failed,
         "results": results,
-        "largest difference of states": agreement(results),
+        "largest difference of states": differences_of_engines(results),
         "doubts": list(assembly.doubts),
         "table": [*trust_line(assembly), *doubt_lines(assembly), *beside],
     }
@@ -50,15 +50,15 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 def _line(result: Result) -> dict[str, Any]:
     told = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
-    return {**told, "counts": result.counts(), "channels": summary(result)}
+    return {**told, "counts": result.counts(), "channels": channel_summary(result)}
 
 
-def agreement(results: dict[str, Result]) -> dict[str, float]:
+def differences_of_engines(results: dict[str, Result]) -> dict[str, float]:
     """Largest difference of any state (m, rad, m/s, rad/s) between each two results, on their common grid."""
-    return {f"{a} - {b}": difference(results[a], results[b]) for a, b in combinations(results, 2)}
+    return {f"{a} - {b}": largest_state_difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
-def difference(first: Result, other_result: Result) -> float:
+def largest_state_difference(first: Result, other_result: Result) -> float:
     """Largest difference of any state; where the rows lie elsewhere, the denser run is read by a cubic spline."""
     if same_times(first, other_result):
         return float(np.abs(first.states - other_result.states).max())
@@ -76,7 +76,7 @@ def same_times(first: Result, other_result: Result) -> bool:
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
-    from models.drawing.figures import COLOURS, COLUMN_WIDTH, LABELS, heading, legend_below, save, subplots
+    from models.drawing.figures import COLOURS, COLUMN_WIDTH, LABELS, add_heading, legend_below, save, subplots
 
     panels = [
         ("z3", "Heave of the chassis, down [m]", 1.0),
@@ -96,7 +96,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
         _differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
     legend_below(figure, axes[0])
-    heading(figure, scene.title, results)
+    add_heading(figure, scene.title, results)
     save(figure, path)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Result
-from models.measured.curve import curve
+from models.measured.curve import channel_curve
 from models.measured.formats import open_source
 from models.systems.single_track.run import run as run_scene
 from models.systems.single_track.scene import SingleTrackScene
@@ -15,7 +15,7 @@ from models.systems.single_track.scene import SingleTrackScene
 SYSTEM = "single-track"
 Progress = Callable[[str, float], None]
 SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
-TITLES = {"wheels steer": "Steer angle of the wheels"}
+PANEL_TITLES = {"wheels steer": "Steer angle of the wheels"}
 """Titles of panels whose channel's name is none."""
 
 
@@ -24,11 +24,13 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
     driven.save(folder / "drive.nc")
-    figure(driven, measured(scene, driven), scene.title, folder / "drive.png")
+    figure(driven, measured_channels(scene, driven), scene.title, folder / "drive.png")
     answer = {
         f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
     }
-    answer |= {f"largest slip angle {axle} [rad]": float(np.abs(driven[f"slip angle {axle}"]).max()) for axle in AXLES}
+    answer |= {
+        f"largest slip angle {axle} [rad]": float(np.abs(driven[f"slip angle {axle}"]).max()) for axle in AXLE_NAMES
+    }
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -39,15 +41,15 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     }
 
 
-AXLES = ("front", "rear")
+AXLE_NAMES = ("front", "rear")
 
 
-def measured(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
+def measured_channels(scene: SingleTrackScene, driven: Result) -> dict[str, np.ndarray]:
     """Measured values (n,) of the channels that the file of the drive contains, at the times of the computed drive and
     in its units."""
     source = open_source(scene.path(scene.drive.file, "drive.file"))
     known = [name for name in SHOWN_CHANNELS if name in {channel.name for channel in source.channels}]
-    curves = {name: curve(source, name, driven.data[name].attrs["units"]) for name in known}
+    curves = {name: channel_curve(source, name, driven.data[name].attrs["units"]) for name in known}
     return {name: np.interp(driven.times, *every) for name, every in curves.items()}
 
 
@@ -57,24 +59,24 @@ def figure(driven: Result, beside: Mapping[str, np.ndarray], title: str, path: P
 
     beside : values (n,) that were measured, drawn beside the channels of their names.
     """
-    from models.drawing.figures import BLUE, DARK, MEASURED, VERMILION, heading, legend_below, panels, save
+    from models.drawing.figures import BLUE, DARK, MEASURED_COLOUR, VERMILION, add_heading, legend_below, panels, save
 
     drawing, axes = panels(6, 2, 2.15)
     curves = {"wheels steer": "rad", **SHOWN_CHANNELS}
     for axis, (name, unit) in zip(axes, curves.items(), strict=False):
         if name in beside:
-            axis.plot(driven.times, beside[name], color=MEASURED, linewidth=2.0, label="measured")
+            axis.plot(driven.times, beside[name], color=MEASURED_COLOUR, linewidth=2.0, label="measured")
         axis.plot(driven.times, driven[name], color=DARK, linewidth=0.8, label="computed")
-        axis.set(ylabel=f"[{unit}]", title=TITLES.get(name, name.capitalize()), xlabel="time [s]")
-    used = {axle: driven[f"side force {axle}"] / driven[f"load {axle}"] for axle in AXLES}
-    for axle, colour, size in zip(AXLES, (BLUE, VERMILION), (4.0, 1.5), strict=True):
+        axis.set(ylabel=f"[{unit}]", title=PANEL_TITLES.get(name, name.capitalize()), xlabel="time [s]")
+    used = {axle: driven[f"side force {axle}"] / driven[f"load {axle}"] for axle in AXLE_NAMES}
+    for axle, colour, size in zip(AXLE_NAMES, (BLUE, VERMILION), (4.0, 1.5), strict=True):
         axes[4].plot(driven[f"slip angle {axle}"], used[axle], ".", color=colour, markersize=size, label=axle)
         axes[5].plot(driven.times, driven[f"slip angle {axle}"], color=colour, linewidth=0.8)
     axes[4].set(xlabel="slip angle [rad]", ylabel="[-]", title="Side force / load of each axle")
     axes[5].set(xlabel="time [s]", ylabel="[rad]", title="Slip angle of each axle")
     axes[4].legend(markerscale=3.0)
     legend_below(drawing, *axes[:4])
-    heading(drawing, title, {"drive": driven})
+    add_heading(drawing, title, {"drive": driven})
     return save(drawing, path)
 
 

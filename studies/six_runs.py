@@ -15,7 +15,14 @@ from models.core.result import Result
 from models.core.whole_files import write_whole
 from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.six_runs import DRIFT, Options, error, followed, options_of, row
+from models.systems.pitch_plane.six_runs import (
+    DRIFT_OFF_PITCH,
+    Options,
+    error,
+    figures_of_run,
+    measurement_and_runs,
+    options_of,
+)
 
 Progress = Callable[[str, float], None]
 
@@ -27,7 +34,7 @@ check = options_of
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All six runs in each engine; saves every result, five figures and ``table.txt``."""
     options = check(scene, engines)
-    measured, deviation, scenes = followed(scene, folder, scene.error)
+    measured, deviation, scenes = measurement_and_runs(scene, folder, scene.error)
     measured.save(folder / "measurement.nc")
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
@@ -40,12 +47,14 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             failed[f"{engine}, {name}"] = str(failure)
             continue
         runs[engine][name].every(SAVED_SPACING).save(folder / f"{engine} {name}.nc")
-    rows = [row(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()]
+    rows = [
+        figures_of_run(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()
+    ]
     table = text(rows, engines, options, deviation)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figures", 1.0)
     if not failed:
-        _figures(measured, runs[engines[0]], folder)
+        _draw_figures(measured, runs[engines[0]], folder)
     told = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
     return {
         "scene": scene.title,
@@ -59,7 +68,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-PUBLISHED = {
+PUBLISHED_DRIFT = {
     "undisturbed": "about 30 s",
     "noisy 1": "about 10 s",
     "perturbed": "about 10 s",
@@ -76,7 +85,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
         runs.setdefault(line["run"], []).append(line)
     free, guided = list[str](), list[str]()
     for name, lines in runs.items():
-        first, paper = lines[0], PUBLISHED.get(name, "")
+        first, paper = lines[0], PUBLISHED_DRIFT.get(name, "")
         if "moment max" in first:
             cells = " ".join(f"{line['moment max']:>9.1f}" for line in lines)
             more = f"{first['moment rms']:>9.1f}   {first['inertia max'] / 1e3:>9.1f}"
@@ -87,7 +96,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
     names = " ".join(f"{engine:>9}" for engine in engines)
     return [
         f"  Sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N.",
-        f"  Time [s] until the pitch is {DRIFT} rad wrong",
+        f"  Time [s] until the pitch is {DRIFT_OFF_PITCH} rad wrong",
         f"  {'force-excited':<20} {names}   heave [m]   paper",
         *free,
         "  Largest enforced moment [N m]",
@@ -98,7 +107,7 @@ def text(rows: list[dict[str, Any]], engines: tuple[str, ...], options: Options,
     ]
 
 
-def _figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
+def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
     """Draw figures like 4 to 8 of the paper."""
     from models.drawing.figures import save
 
@@ -125,7 +134,7 @@ def _figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> Non
 
 
 def _figure_measurement(measured_run: Result) -> Any:
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 4.6), sharex="col", width_ratios=(2, 1))
     middle = round(float(measured_run.times[-1]) / 2, 1)
@@ -140,30 +149,30 @@ def _figure_measurement(measured_run: Result) -> Any:
     legend_below(figure, axes[0, 0])
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured_run})
+    add_heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured_run})
     return figure
 
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
     """Plot each run's heave error on a logarithmic scale, and its pitch; the first of the results is the
     measurement."""
-    from models.drawing.figures import COLUMN_WIDTH, TRUTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, TRUTH_COLOUR, add_heading, legend_below, subplots
 
     figure, (heave, pitch) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     (name, measured), *runs = results.items()
-    pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH, linewidth=1.8, zorder=9)
+    pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH_COLOUR, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
         heave.semilogy(run.times, np.abs(error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
         pitch.plot(run.times, run["pitch"], label=name, color=f"C{i}")
     heave.set(title="Error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
     pitch.set(title="Pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
     legend_below(figure, pitch, columns=6)
-    heading(figure, title, results)
+    add_heading(figure, title, results)
     return figure
 
 
 def _figure_moment(result: Result) -> Any:
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (inertia, moment) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.2))
     inertia.plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
@@ -171,7 +180,7 @@ def _figure_moment(result: Result) -> Any:
     moment.plot(result.times, result["enforced_moment"], linewidth=0.5)
     moment.set(title="Enforced moment [N m]", xlabel="time [s]")
     title = "Pitch prescribed, perturbed model and noisy forces: what the guidance takes"
-    heading(figure, title, {"guided, both": result})
+    add_heading(figure, title, {"guided, both": result})
     return figure
 
 

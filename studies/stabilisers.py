@@ -10,11 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from models.core.result import tabulated
+from models.core.result import result_from_table
 from models.core.told import Results
 from models.core.whole_files import whole_file, write_whole
-from models.drift.score import CHANNELS
-from models.fatigue.damage import CONVENTION
+from models.drift.score import SECTION_FORCE_CHANNELS
+from models.fatigue.damage import COUNTING_CONVENTION
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.stabilised import Bench, Options, Row, compare, options_of
 
@@ -24,7 +24,7 @@ check = options_of
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt``, two figures."""
-    from models.drawing.drift import decision, stiffness
+    from models.drawing.drift import decision_figure, stiffness
     from models.drawing.figures import save
 
     benches, rows, failed = compare(scene, engines, folder, progress)
@@ -38,12 +38,12 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         writer.writeheader()
         writer.writerows(rows)
     results = {name: result for bench in benches for name, result in bench.results.items()}
-    saved = tabulated(scene, rows, "run")
-    saved.data.attrs["error"] = _steps(benches[0].results)
+    saved = result_from_table(scene, rows, "run")
+    saved.data.attrs["error"] = _step_error_text(benches[0].results)
     saved.save(folder / "score.nc")
     progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
-    save(decision(of_first, options.limits, options.grade, results), folder / "decide.png")
+    save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
     save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
     return {
         "scene": scene.title,
@@ -56,7 +56,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _steps(results: Results) -> str:
+def _step_error_text(results: Results) -> str:
     """Step error of the score as JSON text: that of the measurement, because all runs use its steps."""
     error = json.loads(next(iter(results.values())).data.attrs["error"])
     return json.dumps(
@@ -67,7 +67,8 @@ def _steps(results: Results) -> str:
 def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
     """The table as lines of text, with a block for each engine and road."""
     lines = [
-        f"  Damage ratios: {CONVENTION}, exponent {options.slope:g}. Accepted: all four body-frame ratios within "
+        f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
+        "body-frame ratios within "
         f"{options.limits.damage_error:.0%},",
         f"  pitch within {options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
         f"{options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
@@ -83,32 +84,32 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
             f"  {engine} on {where}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
             f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
         ]
-        lines += [HEADS, UNITS]
+        lines += [HEADING_LINE, UNITS_LINE]
         lines += [_line(row, free) for row in of_engine]
     return lines
 
 
-HEADS = (
+HEADING_LINE = (
     f"  {'':<25}{'damage ratio':^28}{'vertical':>9}{'pitch error':>16}{'artificial moment':>21}{'cost':>8}"
     f"{'verdict':>11}{'without':>11}"
 )
-UNITS = (
+UNITS_LINE = (
     f"  {'method':<25}{'f3x':>7}{'f3z':>7}{'f4x':>7}{'f4z':>7}{'f3':>9}{'max':>9}{'rms':>7}"
     f"{'rms':>7}{'max N m':>8}{'share':>6}{'x free*':>8}{'':>11}{'truth':>11}"
 )
 
 
 def _line(row: Row, free: float) -> str:
-    ratios = "".join(f"{_ratio(row[f'damage {channel}']):>7}" for channel in CHANNELS)
+    ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
-        f"  {row['method']:<25}{ratios}{_ratio(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
+        f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
         f"{row['pitch error rms [rad]']:>7.4f}{row['moment rms [N m]']:>7.0f}{row['moment max [N m]']:>8.0f}"
         f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free:>8.1f}{row['verdict']:>11}"
         f"{row['without truth']:>11}"
     )
 
 
-def _ratio(value: float | None) -> str:
+def _ratio_text(value: float | None) -> str:
     """Text of a damage ratio in at most six characters; "-" for a tumbled run, which has none."""
     return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}" if value < 1e3 else f"{value:.0e}"
 

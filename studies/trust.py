@@ -23,28 +23,34 @@ from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.statistics import ERRORS_95, quantile
+from models.ensemble.statistics import ERRORS_95, quantile_with_interval
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run_away
-from models.systems.pitch_plane.scene import Scene, assemble, changed
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
 from models.systems.pitch_plane.trust import (
-    ANGLE,
+    UNTRUSTED_PITCH,
     GrowthCurve,
-    growth,
     interpolation,
-    model,
+    model_error_curve,
     noise,
-    rounding,
+    pitch_error_growth,
+    rounding_error_curve,
     small_errors,
 )
-from models.systems.pitch_plane.virtual_measurement import check_road, check_steps, follower, measure, write_measurement
+from models.systems.pitch_plane.virtual_measurement import (
+    check_road,
+    check_steps,
+    follower_builder,
+    measure,
+    write_measurement,
+)
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
-SPACING = 0.1
+ROW_SPACING = 0.1
 """Of the paths' rows in the figure, s."""
-ORDERS = {"held": 2, "linear": 2, "smooth": 4}
+ORDER_OF_RULE = {"held": 2, "linear": 2, "smooth": 4}
 """Power of the sampling period with which each rule between the samples errs."""
 
 
@@ -55,7 +61,7 @@ class Options(Strict):
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
     inertia_error: float = Field(0.05, gt=0, lt=1, description="share by which the pitch inertia may be wrong")
     wanted: float = quantity("s", "time for which the run shall be trusted", default=60.0)
-    angle: float = quantity("rad", "pitch error from which on a run is not trusted", default=ANGLE)
+    angle: float = quantity("rad", "pitch error from which on a run is not trusted", default=UNTRUSTED_PITCH)
     paths: int = Field(100, ge=20, description="noise paths of the ensemble")
     seed: int = Field(1, ge=0, lt=2**63, description="seed of the noise")
 
@@ -64,26 +70,26 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     """Predictions, an ensemble and two runs in the first engine; saves ``table.txt``, ``trust.nc``, a figure."""
     options = check(scene, engines)
     base, measured, largest = _forces(scene, options, folder)
-    deviation, assembly = options.noise_fraction * largest, assemble(base)
+    deviation, assembly = options.noise_fraction * largest, assembly_of_scene(base)
     other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
     curves = {
         "noise": noise(assembly, deviation),
         "interpolation": interpolation(assembly),
-        "inertia": model(assembly, other),
-        "rounding": rounding(assembly),
+        "inertia": model_error_curve(assembly, other),
+        "rounding": rounding_error_curve(assembly),
     }
     runs = {}
     if measured is not None:
         progress("runs", 0.2)
         clean = run_away(base, engines[0])
-        wrong = run_away(changed(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
+        wrong = run_away(changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
         runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
-    spread = _ensemble(base, quiet, deviation, options, engines[0], Crew.of(scene, usual=1))
-    rows = _rows(curves, runs, spread, options)
-    table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
+    spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, usual=1))
+    rows = _drift_off_rows(curves, runs, spread, options)
+    table = _text(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
     saved.save(folder / "trust.nc")
@@ -116,11 +122,11 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result
     """The scene driven by forces; the run on the road from which they come, if there is one; and the largest force
     (N)."""
     if "road" not in scene.effects:
-        return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
+        return scene, None, float(np.abs(assembly_of_scene(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
     measured = measure(scene, scene.error)
     largest = write_measurement(measured, folder, 1.0 / options.sampling_rate)
-    return follower(scene, folder)({}, {}), measured, largest
+    return follower_builder(scene, folder)({}, {}), measured, largest
 
 
 def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
@@ -129,7 +135,7 @@ def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
     return GrowthCurve(run.times, np.abs(run["pitch"] - pitch))
 
 
-def _ensemble(
+def _ensemble_of_paths(
     base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
 ) -> dict[str, np.ndarray]:
     """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
@@ -137,8 +143,8 @@ def _ensemble(
 
     The errors are nan from where a path left all bounds.
     """
-    noisy = changed(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
-    rows = np.arange(0, len(quiet.times), max(1, round(SPACING / base.run.step)))
+    noisy = changed_scene(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
+    rows = np.arange(0, len(quiet.times), max(1, round(ROW_SPACING / base.run.step)))
     times, true = quiet.times[rows], quiet["pitch"]
     with crew.at_work(Blocks().count(options.paths)) as pool:
         paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths, executor=pool)
@@ -151,7 +157,7 @@ def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], o
     median."""
     result.data.attrs["error"] = quiet.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
-    middle, low, high = quantile(spread["drift_off"], 0.5)
+    middle, low, high = quantile_with_interval(spread["drift_off"], 0.5)
     if not math.isfinite(high):
         return result
     error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
@@ -168,11 +174,11 @@ def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -
         "drift_off": Channel("path", spread["drift_off"], "s", "drift-off, infinite if never"),
         "error": Channel(("path", "time"), spread["errors"], "rad", "pitch error"),
     }
-    axes = {"source": Channel("source", list(NAMES)), "time": Channel("time", spread["times"], "s")}
+    axes = {"source": Channel("source", list(SOURCE_NAMES)), "time": Channel("time", spread["times"], "s")}
     return result(scene, drift_off | paths, axes)
 
 
-NAMES = {
+SOURCE_NAMES = {
     "noise": "noise on the samples",
     "interpolation": "interpolation between them",
     "inertia": "a wrong inertia",
@@ -180,18 +186,23 @@ NAMES = {
 }
 
 
-def _rows(
+def _drift_off_rows(
     curves: dict[str, GrowthCurve], runs: dict[str, GrowthCurve], spread: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
     """Predicted and measured drift-off times (s) by source; None if they lie beyond the run."""
     rows = list[Row]()
     for name, curve in curves.items():
-        measured, quartiles = runs[name].passes(options.angle) if name in runs else None, None
+        measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
-            times = [quantile(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
             measured, *quartiles = [time if math.isfinite(time) else None for time in times]
         rows.append(
-            {"source": name, "predicted": curve.passes(options.angle), "measured": measured, "quartiles": quartiles}
+            {
+                "source": name,
+                "predicted": curve.passing_time(options.angle),
+                "measured": measured,
+                "quartiles": quartiles,
+            }
         )
     return rows
 
@@ -203,7 +214,10 @@ def _text(
     require."""
     lines = [
         f"  pitch {options.angle:g} rad off after [s]     predicted   measured",
-        *(f"  {NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured(row):>10}" for row in rows),
+        *(
+            f"  {SOURCE_NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured_text(row):>10}"
+            for row in rows
+        ),
     ]
     limits = [row["predicted"] for row in rows if row["predicted"] is not None]
     until = f"until about {min(limits):.3g} s" if limits else "to its end"
@@ -212,14 +226,14 @@ def _text(
         if rate
         else f"  trusted {until}; a tilt error does not grow exponentially"
     )
-    return lines + _remedies(options, deviation, rate, base, curves)
+    return lines + _remedy_lines(options, deviation, rate, base, curves)
 
 
 def _drift_off_text(time: float | None) -> str:
     return "beyond the run" if time is None else f"{time:.2f}"
 
 
-def _measured(row: Row) -> str:
+def _measured_text(row: Row) -> str:
     if row["source"] == "rounding":
         return "-"
     if row["quartiles"]:
@@ -228,17 +242,17 @@ def _measured(row: Row) -> str:
     return _drift_off_text(row["measured"])
 
 
-def _remedies(
+def _remedy_lines(
     options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
     extrapolated by the growth rate of errors."""
-    forces = assemble(base).input
+    forces = assembly_of_scene(base).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
     for name in ("noise", "interpolation", "inertia"):
         excess = _size_at_time(curves[name], options, rate)
-        order = ORDERS[base.effects["wheel_forces"].interpolation]
+        order = ORDER_OF_RULE[base.effects["wheel_forces"].interpolation]
         takes = {
             "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
             "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "
@@ -246,7 +260,7 @@ def _remedies(
             "inertia": f"an inertia known to {100 * options.inertia_error / excess:.2g} % instead of "
             f"{100 * options.inertia_error:g} %",
         }
-        lines.append(f"    {takes[name]}" if excess > 1 else f"    nothing against {NAMES[name]}")
+        lines.append(f"    {takes[name]}" if excess > 1 else f"    nothing against {SOURCE_NAMES[name]}")
     return [*lines, "  or a stabiliser: see the effects prescribed_pitch, pitch_spring, kalman_filter"]
 
 
@@ -257,7 +271,7 @@ def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
     Its deviation grows as t^1.5 at first and exponentially where the rate has had its time: what follows the run is
     taken for as rough as the run.
     """
-    time = curve.passes(options.angle)
+    time = curve.passing_time(options.angle)
     start = min(options.wanted, curve.times[-1] if time is None else time)
     size = float(curve.size[: np.searchsorted(curve.times, start) + 1].max())
     longer = pitch_variance(options.wanted, rate, 1.0) / pitch_variance(start, rate, 1.0)
@@ -274,7 +288,7 @@ def _figure(
 ) -> None:
     """Plot the growth of the pitch error by source on a logarithmic scale: predicted laws dashed, computed runs
     solid."""
-    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, heading, save, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, GREEN, GREY, VERMILION, add_heading, save, subplots
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.8))
@@ -291,7 +305,7 @@ def _figure(
     axis.axhline(options.angle, color=DARK, linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
     axis.set(xlabel="time [s]", ylabel="pitch error [rad]", ylim=(1e-12, 10), xlim=(0, curves["noise"].times[-1]))
     figure.legend(loc="outside lower center", ncols=3)
-    heading(figure, "How long a force-excited run can be trusted: growth of its pitch error by source", results)
+    add_heading(figure, "How long a force-excited run can be trusted: growth of its pitch error by source", results)
     save(figure, path)
 
 

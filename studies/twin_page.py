@@ -9,27 +9,27 @@ from typing import Any
 
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from models.own_model.elements import Element, elements, is_word, short, shown
-from studies.command.twin import Twins, verdict
+from models.own_model.elements import Element, elements_of_model, is_word, two_digit_text, value_text
+from studies.command.twin import Twins, verdict_sentence
 
-TEMPLATE = "twin.html.jinja"
+PAGE_TEMPLATE = "twin.html.jinja"
 
 
 def write(twins: Twins, path: Path) -> Path:
     """Write the page, whole or not at all; returns its path."""
-    write_whole(path, page(twins))
+    write_whole(path, page_text(twins))
     return path
 
 
-def page(twins: Twins) -> str:
+def page_text(twins: Twins) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
-    environment.filters |= {"short": short, "g": lambda number: f"{number:.6g}"}
-    return environment.get_template(TEMPLATE).render(
+    environment.filters |= {"short": two_digit_text, "g": lambda number: f"{number:.6g}"}
+    return environment.get_template(PAGE_TEMPLATE).render(
         twins=twins,
         title=" and ".join(twins.names),
-        verdicts=[verdict(each) for each in twins.examined],
-        tables=[_rows(list(elements(each.file.twin.model).values())) for each in twins.examined],
+        verdicts=[verdict_sentence(each) for each in twins.examined],
+        tables=[_element_rows(list(elements_of_model(each.file.twin.model).values())) for each in twins.examined],
         hashes=[sha256(each.file.document.path.read_bytes()).hexdigest() for each in twins.examined],
         command=" ".join(sys.argv),
         versions={name: version(name) for name in ("twinrig", "mujoco", "exudyn", "numpy")},
@@ -37,10 +37,10 @@ def page(twins: Twins) -> str:
     )
 
 
-def _rows(listed: list[Element]) -> list[dict[str, Any]]:
+def _element_rows(listed: list[Element]) -> list[dict[str, Any]]:
     """Nonzero elements, with their values as text."""
     return [
-        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": shown(each.value)}
+        {"kind": each.kind, "owner": each.owner, "unit": each.unit, "value": value_text(each.value)}
         for each in listed
-        if each.says and not (is_word(each.value) and each.value[0] == "on")
+        if each.is_nonzero and not (is_word(each.value) and each.value[0] == "on")
     ]

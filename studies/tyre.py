@@ -46,7 +46,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     tables = tables_of(scene)
-    answer = {name: table.figures(options.load) for name, table in tables.items()}
+    answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
         name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
         for name, table in tables.items()
@@ -58,11 +58,11 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": {},
         "answer": answer,
         "results": results,
-        "table": lines(answer, options.load),
+        "table": friction_lines(answer, options.load),
     }
 
 
-def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
+def friction_lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
     """Table of the friction figures under a load (N), with a column per tyre."""
     width = max(12, *(len(name) + 2 for name in answer))
     rows = [f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}" + "".join(f"{name:>{width}}" for name in answer)]

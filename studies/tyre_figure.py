@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib import colormaps
 
 from models.core.told import Results
-from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, save, subplots
+from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, save, subplots
 from models.tyre.tyre_table import TyreTable
 
-SLIPS = np.linspace(0.0, 1.0, 1001)
-COLOURS = colormaps["viridis"]
+DRAWN_SLIPS = np.linspace(0.0, 1.0, 1001)
+COLOUR_MAP = colormaps["viridis"]
 
 
 def tyre_figure(
@@ -26,12 +26,12 @@ def tyre_figure(
     angles, load = slip_angles
     figure, axes = subplots(len(tables), 3, figsize=(COLUMN_WIDTH, 2.9 * len(tables) + 0.5), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
-        x, y = table.friction(np.deg2rad(angles), SLIPS, load)
+        x, y = table.friction(np.deg2rad(angles), DRAWN_SLIPS, load)
         top = 1.08 * max(x.max(), y.max())
         for i, angle in enumerate(angles):
-            colour = COLOURS(0.9 * i / max(len(angles) - 1, 1))
-            row[0].plot(SLIPS, x[i], color=colour, label=f"{angle:g}°")
-            row[1].plot(SLIPS, y[i], color=colour)
+            colour = COLOUR_MAP(0.9 * i / max(len(angles) - 1, 1))
+            row[0].plot(DRAWN_SLIPS, x[i], color=colour, label=f"{angle:g}°")
+            row[1].plot(DRAWN_SLIPS, y[i], color=colour)
             row[2].plot(x[i], y[i], color=colour)
         row[0].set(xlabel="slip [-]", ylabel="μx [-]", ylim=(0, top), title=f"{name}: along the wheel")
         row[1].set(xlabel="slip [-]", ylabel="μy [-]", ylim=(0, top), title="Across the wheel")
@@ -39,5 +39,5 @@ def tyre_figure(
             xlabel="μx [-]", ylabel="μy [-]", xlim=(0, top), ylim=(0, top), aspect="equal", title="Both, slip 0 to 1"
         )
     legend_below(figure, axes[0, 0], columns=len(angles))
-    heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", results)
+    add_heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", results)
     save(figure, path)

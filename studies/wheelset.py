@@ -9,16 +9,16 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result, join_results
 from models.core.tables import write_table
-from models.core.told import gathered
-from models.rail.energy import ledger
+from models.core.told import joined_result
+from models.rail.energy import energy_ledger
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.equations import Y
-from models.rail.limit_cycle import maxima
-from models.rail.linear import critical_or_why, kinematic_wavelength, klingel
+from models.rail.limit_cycle import positive_maxima
+from models.rail.linear import critical_or_why, kinematic_wavelength, klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset import conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
-from models.systems.wheelset.run import Linear, at_speeds, linearised, over_speeds
+from models.systems.wheelset.run import Linear, at_speeds, linearised_result, over_speeds
 from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -37,14 +37,14 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
-            eigenvalues[engine] = linearised(scene, engine, error=scene.error)
+            eigenvalues[engine] = linearised_result(scene, engine, error=scene.error)
             progress(f"paths of {engine}", (i + 0.5) / len(engines))
             paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:
             failed[engine] = str(error)
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
     if linear:
-        gathered(join_results(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
+        joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
         _save_table(linear, folder)
         stability_figure(eigenvalues, wheelset, scene.title, folder / "stability.png")
     if paths:
@@ -57,17 +57,18 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer(wheelset, linear, paths) | (conicity.conicity_numbers(conicities) if conicities else {}),
+        "answer": _answer_of_paths(wheelset, linear, paths)
+        | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
             **_results(paths),
             **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},
             **({"conicity": conicities} if conicities else {}),
         },
         "table": [
-            *(conicity.lines(conicities.detail) if conicities else []),
-            *_waves(wheelset, linear),
-            *_stability(wheelset, linear),
-            *_motions(scene, paths),
+            *(conicity.conicity_lines(conicities.detail) if conicities else []),
+            *_wavelength_lines(wheelset, linear),
+            *_stability_lines(wheelset, linear),
+            *_path_lines(scene, paths),
         ],
     }
 
@@ -91,12 +92,12 @@ def _save_table(linear: dict[str, Linear], folder: Path) -> None:
     write_table(folder / "over_speed.csv", columns)
 
 
-def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
+def _answer_of_paths(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict[str, Any]:
     """Critical speed (None if there is none) and figures of the paths, as plain numbers in SI."""
     return {
-        "klingel": klingel(wheelset),
+        "klingel": klingel_wavelength(wheelset),
         "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
-        "critical_speed": {engine: linear_run.critical for engine, linear_run in linear.items()},
+        "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear.items()},
         "largest_power": {
             engine: max(float(path["power"].max()) for path in paths_of_engine.values())
             for engine, paths_of_engine in paths.items()
@@ -104,11 +105,11 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict
     }
 
 
-def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _wavelength_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """Lines on the wavelength of the free wheelset: Klingel's closed form, and the deviation of each engine's
     eigenvalues from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
-    closed, first = klingel(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
+    closed, first = klingel_wavelength(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
     lines = [
         "  wavelength of the free wheelset",
         f"    {closed_form:<34}{closed:>14.9g} m",
@@ -123,15 +124,16 @@ def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     return lines
 
 
-def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
+def _stability_lines(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """Lines on the critical speed and frequency in every engine, or that there is no critical speed."""
     lines = [
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
     ]
-    first = next((linear_run.critical for linear_run in linear.values()), None)
+    first = next((linear_run.critical_speed for linear_run in linear.values()), None)
     return lines + [
-        f"    {f'eigenvalues of {engine}':<34}" + _speed(linear_run.critical, linear_run.why, first if k else None)
+        f"    {f'eigenvalues of {engine}':<34}"
+        + _speed(linear_run.critical_speed, linear_run.no_critical_reason, first if k else None)
         for k, (engine, linear_run) in enumerate(linear.items())
     ]
 
@@ -142,7 +144,7 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
     return f"{critical:>14.9g} m/s" + (f" {critical / first - 1:+.0e} from the first" if first else "")
 
 
-def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
+def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
     """Lines on how each path ends, how far the engines' paths differ, and the energy balance."""
     if not paths:
         return []
@@ -154,9 +156,9 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
             engine: np.abs(paths_of_engine[speed].detail.states - motion.states).max()
             for engine, paths_of_engine in others
         }
-        book = ledger(equations_of(scene, "reference", speed), motion)
+        book = energy_ledger(equations_of(scene, "reference", speed), motion)
         lines += [
-            f"    {speed:g} m/s: {_ending(motion)}",
+            f"    {speed:g} m/s: {_ending_text(motion)}",
             *(f"      {engine}: within {gap:.1e} of {name} (m, rad, s)" for engine, gap in gaps.items()),
             f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
             f"together they take {book.creep[-1]:,.4g} J",
@@ -166,10 +168,10 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
     return lines
 
 
-def _ending(motion: Motion) -> str:
+def _ending_text(motion: Motion) -> str:
     """Text on a path's last amplitude, and by how much it changed in the last cycle."""
     y = motion.states[:, Y]
-    tops = y[maxima(y)]
+    tops = y[positive_maxima(y)]
     if tops.size < 2:
         return f"ends at {1e3 * motion.states[-1, Y]:.3g} mm without a second maximum"
     return f"last amplitude {1e3 * tops[-1]:.4g} mm, {100 * (tops[-1] / tops[-2] - 1):+.3g} % in the last cycle"

@@ -15,7 +15,7 @@ from models.drawing.figures import (
     LABELS,
     SMALL_TEXT,
     VERMILION,
-    heading,
+    add_heading,
     legend_below,
     save,
     subplots,
@@ -23,12 +23,12 @@ from models.drawing.figures import (
 from models.rail.equations import YAW, Y
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.limit_cycle import Orbit
-from models.rail.linear import klingel
+from models.rail.linear import klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.conicity import Conicities
 from models.systems.wheelset.run import Linear, at_speeds
 
-MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
+ENGINE_MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""
 SHOWN_SECONDS = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
@@ -54,19 +54,25 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
-        left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), MARKS[engine], **style)
+        left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), ENGINE_MARKS[engine], **style)
         middle.plot(
-            linear_run.speeds, 2.0 * np.pi * linear_run.speeds / linear_run.hunting.imag, MARKS[engine], **style
+            linear_run.speeds, 2.0 * np.pi * linear_run.speeds / linear_run.hunting.imag, ENGINE_MARKS[engine], **style
         )
-        right.plot(linear_run.hunting.real, linear_run.hunting.imag / (2.0 * np.pi), MARKS[engine], **style)
+        right.plot(linear_run.hunting.real, linear_run.hunting.imag / (2.0 * np.pi), ENGINE_MARKS[engine], **style)
     first = next(iter(linear.values()))
     for line in (left.axhline, right.axvline):
         line(0.0, color="0.6", linewidth=0.8)
-    if first.critical is not None:
-        left.axvline(first.critical, color="0.6", linestyle=":")
-        _note(left, f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8))
-    middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL_TEXT)
+    if first.critical_speed is not None:
+        left.axvline(first.critical_speed, color="0.6", linestyle=":")
+        _note(left, f"{first.critical_speed:.4g} m/s", (first.critical_speed, 0.0), (-4, 8))
+    middle.axhline(klingel_wavelength(wheelset), color="0.6", linestyle=":")
+    _note(
+        middle,
+        "Klingel's, without suspension",
+        (first.speeds[-1], klingel_wavelength(wheelset)),
+        (0, -12),
+        fontsize=SMALL_TEXT,
+    )
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
@@ -88,7 +94,7 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
     right.margins(x=0.6)
     middle.margins(y=0.2)
     legend_below(figure, left)
-    heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
+    add_heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
     save(figure, path)
 
 
@@ -106,7 +112,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
         for i, (engine, motions) in enumerate(paths.items()):
             states, colour = motions[speed].states, COLOURS[engine]
             every = slice(40 * (1 + i), None, 150) if i else slice(None)
-            mark = MARKS[engine] if i else "-"
+            mark = ENGINE_MARKS[engine] if i else "-"
             column[0].plot(path_then.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
             if i:
                 gap = np.maximum(np.abs(states - path_then.states).max(axis=1), 1e-17)
@@ -116,7 +122,7 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
         column[-1].set_xlabel("time [s]")
     legend_below(figure, axes[0, 0])
     told = {f"{engine}, {at}": run for engine, path_then in results.items() for at, run in at_speeds(path_then).items()}
-    heading(figure, f"{title}: the same path in every implementation", told)
+    add_heading(figure, f"{title}: the same path in every implementation", told)
     save(figure, path)
 
 
@@ -136,7 +142,7 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     legend_below(figure, axes[0, 0])
     largest = max(float(course.contacts["power"].max()) for course in paths.values())
     told = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
-    heading(figure, f"{title}\n{told}", at_speeds(results))
+    add_heading(figure, f"{title}\n{told}", at_speeds(results))
     save(figure, path)
 
 
@@ -163,11 +169,13 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
     _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL_TEXT)
     ends = np.array([speeds.min(), speeds.max()])
-    right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
+    right.plot(
+        ends, ends / klingel_wavelength(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength"
+    )
     left.set_title("Amplitude")
     right.set(ylabel="frequency [Hz]", title="Frequency")
     legend_below(figure, left, right, columns=3)
-    heading(figure, title, {"branch": branch})
+    add_heading(figure, title, {"branch": branch})
     save(figure, path)
 
 
@@ -177,7 +185,9 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
-        left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
+        left.plot(
+            1e3 * states[:, Y], 1e3 * states[:, YAW], ENGINE_MARKS[engine], color=COLOURS[engine], label=LABELS[engine]
+        )
     first = next(iter(cycles.values()))
     around = first.path()
     for side, colour, (along, across) in _wheels(around.contacts, "fx", "fy"):
@@ -191,7 +201,7 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
-    heading(figure, f"{title}\nOne cycle, the same in every implementation", results)
+    add_heading(figure, f"{title}\nOne cycle, the same in every implementation", results)
     save(figure, path)
 
 
@@ -221,5 +231,5 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
     handles, labels = left.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))  # every wave by one entry
     left.legend(list(named.values()), list(named))
-    heading(figure, title, {"conicity": run})
+    add_heading(figure, title, {"conicity": run})
     save(figure, path)

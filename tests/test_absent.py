@@ -11,16 +11,16 @@ import pytest
 import models
 from models.core.scene_effects import module_of, names_of
 from models.core.systems import DEFAULT_SYSTEM
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import (
     belongs_to_effects,
-    installed,
+    installed_callbacks,
     leanest_march,
     march,
     probe,
-    registered,
+    registered_callbacks,
     user_functions,
 )
 from validation.cases import absent, effect_prices
@@ -79,7 +79,7 @@ def test_no_python_and_no_memory_within_a_march(engine, folder):
         march(engine, model(scene({}, 20, folder), engine))
     short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     assert long.frames == short.frames <= 50
-    assert abs(long.memory - short.memory) < 2000
+    assert abs(long.peak_bytes - short.peak_bytes) < 2000
     assert short.callbacks == long.callbacks == 0
 
 
@@ -88,13 +88,13 @@ def test_the_watch_sees_callbacks_where_there_are_some(folder):
     road = {"road": ROAD}
     assert march("exudyn", model(scene(road, 50, folder), "exudyn")).frames >= 50 * 4 * 4
     assert march("mujoco", model(scene(road, 50, folder), "mujoco")).callbacks == 1
-    assert installed() == 0
+    assert installed_callbacks() == 0
 
 
 def test_no_callback_before_during_and_after(folder):
-    assert installed() == 0
+    assert installed_callbacks() == 0
     assert march("mujoco", model(scene({}, 50, folder), "mujoco")).callbacks == 0
-    assert installed() == 0
+    assert installed_callbacks() == 0
     assert user_functions(model(scene({}, 50, folder), "exudyn")) == 0
 
 
@@ -111,11 +111,11 @@ def test_user_functions_are_counted(folder):
 @pytest.mark.parametrize(("engine", "most"), [("exudyn", 4), ("mujoco", 1)])
 def test_callbacks_are_seen_while_a_run_lasts(engine, most, folder):
     """Positive control of the rows of other systems: those of a road, however the run comes about."""
-    with registered(engine) as callbacks:
+    with registered_callbacks(engine) as callbacks:
         model(scene({}, 20, folder), engine).run()
         assert max(callbacks, default=0) == 0
         model(scene({"road": ROAD}, 20, folder), engine).run()
-    assert max(callbacks) == most and installed() == 0
+    assert max(callbacks) == most and installed_callbacks() == 0
 
 
 def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
@@ -126,7 +126,7 @@ def test_a_bare_scene_has_the_states_of_the_vehicle_and_no_others(folder):
     assert (found.nnumeric, found.nu) == (0, 2)  # no input table; the two struts of the suspension
     plane = 3  # Exudyn's point masses and rigid body have their horizontal coordinate as well
     assert (system.ODE2Size(), system.ODE1Size(), system.AEsize()) == (4 + plane, 0, 0)
-    assembly = assemble(own)
+    assembly = assembly_of_scene(own)
     assert (assembly.input, assembly.outputs, assembly.vehicle.pitch_springs) == (None, (), ())
 
 

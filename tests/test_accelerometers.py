@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.time_series import write_time_series
 from models.sensors import rigid_body_motion, sensor_array
-from models.sensors.sensor_array import on_bracket, readings
+from models.sensors.sensor_array import on_bracket, sensor_readings
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from validation.hard_cases import accelerometers as family
@@ -35,7 +35,7 @@ def scene(sensors=SENSORS, effects=None, rate=1000.0, **other):
 
 def still(pitch, places=((1.0, 0.0, 0.2),)):
     none = np.zeros(1)
-    return readings(np.array(places), np.array([pitch]), none, none, none, 9.81)[0]
+    return sensor_readings(np.array(places), np.array([pitch]), none, none, none, 9.81)[0]
 
 
 @pytest.mark.grounds("closed form")
@@ -49,8 +49,8 @@ def test_at_rest_they_read_gravity():
 def test_a_pitch_acceleration_lifts_the_front_and_a_rate_pulls_inwards():
     one, none = np.ones(1), np.zeros(1)
     places = np.array([[2.0, 0.0, -0.5]])
-    assert readings(places, none, none, none, one, 0.0)[0, 0] == pytest.approx([-0.5, 0.0, -2.0])
-    assert readings(places, none, 3 * one, none, none, 0.0)[0, 0] == pytest.approx([-18.0, 0.0, 4.5])
+    assert sensor_readings(places, none, none, none, one, 0.0)[0, 0] == pytest.approx([-0.5, 0.0, -2.0])
+    assert sensor_readings(places, none, 3 * one, none, none, 0.0)[0, 0] == pytest.approx([-18.0, 0.0, 4.5])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -161,11 +161,11 @@ def outcome(name, folder):
 
 
 def test_without_the_check_of_the_arrangement_a_plane_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(sensor_array, "PLANE", 0.0)
+    monkeypatch.setattr(sensor_array, "PLANE_SPREAD_RATIO", 0.0)
     monkeypatch.setattr(sensor_array, "FLAT_SPREAD_RATIO", 0.0)
     assert outcome("accelerometers nearly in a plane", tmp_path) == "SILENT"
 
 
 def test_without_the_consistency_figure_a_loose_sensor_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(rigid_body_motion, "LIMIT", 1.0)
+    monkeypatch.setattr(rigid_body_motion, "UNEXPLAINED_SHARE_LIMIT", 1.0)
     assert outcome("accelerometer on a bracket", tmp_path) == "SILENT"

@@ -14,7 +14,7 @@ from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import BodyMotion, joint_tree
 from validation.adams_joints.mechanism import read_mechanism
 from validation.adams_joints.output_file import OutputFile
-from validation.adams_joints.twin_model import as_mjcf, examined
+from validation.adams_joints.twin_model import as_mjcf, build_differences
 from validation.cases import adams_joints
 
 HEAD = """ADAMS/View model name: own
@@ -214,12 +214,12 @@ def test_joints_in_mjcf_move_as_the_constraints_do(model, tmp_path, name):
     weight."""
     mechanism = model(name)
     motion, _ = ConstrainedBody(mechanism).run(0.4, 5e-3, 2)
-    accelerations, paths = examined(mechanism, tmp_path, 80, 5e-3)
+    accelerations, paths = build_differences(mechanism, tmp_path, 80, 5e-3)
     assert accelerations < 1e-10
     for places in paths.values():
         assert np.abs(places[::2] - motion.place).max() < 1e-6  # steps of 5 ms
     faulty = replace(mechanism, gravity=1.01 * mechanism.gravity)
-    _, others = examined(faulty, tmp_path, 80, 5e-3)
+    _, others = build_differences(faulty, tmp_path, 80, 5e-3)
     assert np.abs(others["exudyn"][::2] - motion.place).max() > 1e-4
 
 

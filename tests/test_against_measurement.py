@@ -10,7 +10,7 @@ from models.core.errors import InputError
 from models.measured.time_shift import ChannelPair, time_shift
 from models.measured.units import factor_between
 from models.systems.pitch_plane.run import run as simulate
-from studies.command.against_measurement import overlay
+from studies.command.against_measurement import overlay_of_run
 from validation.common.scenes import road_scene
 
 LATE = 3.7183
@@ -38,7 +38,7 @@ def measured(run, path, names, factors, late=LATE, rate=400.0, begin=0.31, noise
 
 def test_names_units_and_time_shift_are_found(run, tmp_path):
     file = measured(run, tmp_path / "m.csv", ["f1 [kN]", "pitch [deg]"], [1e-3, 180.0 / np.pi], more="pich [rad]")
-    laid = overlay(run, file)
+    laid = overlay_of_run(run, file)
     assert laid.shift.seconds == pytest.approx(LATE, abs=2e-5) and laid.shift.correlation > 0.99999
     assert {each.name: each.unit for each in laid.matches} == {"f1": "N", "pitch": "rad"}
     assert all(each.relative < 2e-3 for each in laid.matches)
@@ -47,20 +47,20 @@ def test_names_units_and_time_shift_are_found(run, tmp_path):
 
 def test_an_error_is_told_in_size_and_place(run, tmp_path):
     """A gauge that reads 3 % too much: the rms error is 3 % of the rms value; noise of 10 % is told as 10 %."""
-    scaled = overlay(run, measured(run, tmp_path / "a.csv", ["f1 [N]"], [1.03])).matches[0]
+    scaled = overlay_of_run(run, measured(run, tmp_path / "a.csv", ["f1 [N]"], [1.03])).matches[0]
     assert scaled.rms == pytest.approx(0.03 / 1.03 * np.sqrt(np.mean(scaled.measured**2)), rel=2e-2)
     assert abs(scaled.peak) == pytest.approx(0.03 / 1.03 * np.abs(scaled.measured).max(), rel=5e-2)
-    noisy = overlay(run, measured(run, tmp_path / "b.csv", ["f1 [N]"], [1.0], noise=0.1))
+    noisy = overlay_of_run(run, measured(run, tmp_path / "b.csv", ["f1 [N]"], [1.0], noise=0.1))
     assert noisy.matches[0].relative == pytest.approx(0.1 / np.sqrt(1.01), rel=0.15)
     assert noisy.shift.seconds == pytest.approx(LATE, abs=1e-3)
 
 
 def test_a_shift_that_is_given_is_taken(run, tmp_path):
     file = measured(run, tmp_path / "m.csv", ["f1 [N]"], [1.0])
-    assert overlay(run, file, LATE).matches[0].relative < 2e-3
-    assert overlay(run, file, LATE + 0.05).matches[0].relative > 0.05
+    assert overlay_of_run(run, file, LATE).matches[0].relative < 2e-3
+    assert overlay_of_run(run, file, LATE + 0.05).matches[0].relative > 0.05
     with pytest.raises(InputError, match="no sample lies within the run"):
-        overlay(run, file, 100.0)
+        overlay_of_run(run, file, 100.0)
 
 
 def test_samples_that_are_missing_and_means_do_not_matter():
@@ -91,7 +91,7 @@ def test_what_does_not_fit_is_told(run, tmp_path):
     def told(text):
         (tmp_path / "m.csv").write_text(text)
         with pytest.raises(InputError) as error:
-            overlay(run, tmp_path / "m.csv")
+            overlay_of_run(run, tmp_path / "m.csv")
         return str(error.value)
 
     rows = "\n".join(f"{0.1 * i},{np.sin(i)}" for i in range(20))
@@ -103,7 +103,7 @@ def test_what_does_not_fit_is_told(run, tmp_path):
 def test_what_does_not_move_has_no_relative_error(run, tmp_path):
     rows = "\n".join(f"{0.1 * i},4000" for i in range(20))
     (tmp_path / "m.csv").write_text(f"time [s],f1 [N]\n{rows}\n")
-    (line,) = [line for line in overlay(run, tmp_path / "m.csv").lines() if line.startswith("  f1")]
+    (line,) = [line for line in overlay_of_run(run, tmp_path / "m.csv").lines() if line.startswith("  f1")]
     assert "inf" not in line and line.split()[3] == "-"
 
 

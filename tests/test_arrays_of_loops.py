@@ -3,8 +3,8 @@
 import pytest
 
 from models.rail.wheel_forces import Workspace, rails_of, room_for
-from models.rail.wheelset import CHOSEN
-from validation.absence.machinery import arrays, ratio_of_wheelsets, rows
+from models.rail.wheelset import CHOSEN_WHEELSET
+from validation.absence.machinery import allocated_arrays, ratio_of_wheelsets, rows
 
 
 def test_loops_of_bare_scenes_make_no_arrays():
@@ -12,8 +12,10 @@ def test_loops_of_bare_scenes_make_no_arrays():
 
 
 def test_an_array_that_is_made_is_counted():
-    profile = rails_of(CHOSEN).profile
-    assert arrays(lambda: [room_for(profile) for _ in range(10)]) >= 10 * len(Workspace._fields)  # each call has six
+    profile = rails_of(CHOSEN_WHEELSET).profile
+    assert allocated_arrays(lambda: [room_for(profile) for _ in range(10)]) >= 10 * len(
+        Workspace._fields
+    )  # each call has six
 
 
 @pytest.mark.full

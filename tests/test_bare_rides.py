@@ -7,7 +7,7 @@ import pytest
 
 from validation.absence import bare_rides
 from validation.absence.bare_rides import copies, rides
-from validation.absence.hand_built_contact import calls
+from validation.absence.hand_built_contact import contact_jobs
 from validation.absence.hand_built_ride import Car
 
 
@@ -31,6 +31,6 @@ def test_another_wheel_is_seen(engine, monkeypatch):
 
 
 def test_the_written_contact_bears_what_the_bare_one_does():
-    ours, theirs = (job() for job in calls())
+    ours, theirs = (job() for job in contact_jobs())
     assert np.abs(ours).max() > 1e3
     assert ours == pytest.approx(theirs, rel=1e-13)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.bicycle.four_bodies import COUNT, FRONT, HEIGHT, LEAN, PITCH, REAR, STEER, YAW, X, Y, straight
+from models.bicycle.four_bodies import COUNT, FRONT, HEIGHT, LEAN, PITCH, REAR, STEER, YAW, X, Y, straight_rolling
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle, set_bicycle_forces
 from models.bicycle.whipple import Control, load_bicycle
 from models.multibody import forces
@@ -80,7 +80,7 @@ def loads(rolling, q, moving):
 def a_state(seed):
     """Positions and rates (9,) near riding upright; wheels bear weight."""
     random = np.random.default_rng(seed)
-    q, v = straight(BENCHMARK, 4.0)
+    q, v = straight_rolling(BENCHMARK, 4.0)
     q += random.uniform(-0.3, 0.3, COUNT)
     q[PITCH] = -BENCHMARK.tilt
     q[HEIGHT] -= max(place[2] for place, _ in lowest(q)) + 1e-4
@@ -92,7 +92,7 @@ def test_loads_at_rest_are_those_of_a_beam_on_two_supports():
     parts = [(0.0, b.rear_wheel), (b.body.x, b.body), (b.front_frame.x, b.front_frame), (b.wheelbase, b.front_wheel)]
     weight = b.gravity * sum(part.mass for _, part in parts)
     front = b.gravity * sum(x * part.mass for x, part in parts) / b.wheelbase
-    q, v = straight(b, 0.0)
+    q, v = straight_rolling(b, 0.0)
     tyres, _ = RollingBicycle(b).report(q[None], v[None])
     assert tyres[0, :, forces.PRESS] == pytest.approx([weight - front, front], rel=1e-12)
 

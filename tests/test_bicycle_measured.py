@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from models.bicycle.suspects import chosen, deviations
+from models.bicycle.suspects import forecast_deviations, ranked_suspects
 from models.bicycle.weave import decaying_sinusoid, observations
 from models.bicycle.whipple import Control, load_bicycle
 from models.core.errors import InputError
-from studies.bicycle_measured import FEEDBACK, lines, measured
+from studies.bicycle_measured import EXPERIMENT_FEEDBACK, observation_lines, observed_and_predicted
 
 BICYCLE = load_bicycle("steer_by_wire")
-TRUE = FEEDBACK.model_copy(update={"friction": 0.2, "speed_gain": 1.07, "speed_bias": -0.13})
+TRUE = EXPERIMENT_FEEDBACK.model_copy(update={"friction": 0.2, "speed_gain": 1.07, "speed_bias": -0.13})
 SPEEDS = (2.5, 3.0, 3.5, 4.5)
 SUSPECTS = ("friction", "torque_gain", "encoder_gain", "speed_gain", "speed_bias")
 
@@ -51,30 +51,30 @@ def test_a_decaying_sinusoid_is_read_exactly():
 
 def test_the_suspects_that_made_the_recordings_are_called_for(folder):
     seen = observations(folder)
-    choice = chosen(BICYCLE, FEEDBACK, seen, SUSPECTS)
-    assert {*choice.best.names} == {"friction", "speed_gain", "speed_bias"}
-    assert choice.blind == ("encoder_gain",)
-    told = dict(zip(choice.best.names, choice.best.values, strict=True))
+    choice = ranked_suspects(BICYCLE, EXPERIMENT_FEEDBACK, seen, SUSPECTS)
+    assert {*choice.best_subset.names} == {"friction", "speed_gain", "speed_bias"}
+    assert choice.undetermined_parameters == ("encoder_gain",)
+    told = dict(zip(choice.best_subset.names, choice.best_subset.values, strict=True))
     for name in told:
         assert told[name] == pytest.approx(getattr(TRUE, name), abs=0.03)
     assert choice.calls["friction"][1] < 1e-3 < 0.05 < choice.calls["torque_gain"][1]
 
 
 def test_without_a_cause_none_is_called_for(folder):
-    choice = chosen(BICYCLE, TRUE, observations(folder), ("friction", "torque_gain"))
-    assert choice.best.names == () and choice.weights[0] > 0.3
+    choice = ranked_suspects(BICYCLE, TRUE, observations(folder), ("friction", "torque_gain"))
+    assert choice.best_subset.names == () and choice.weights[0] > 0.3
 
 
 def test_speeds_that_took_no_part_are_predicted(folder):
-    answer = measured(folder, (2.5, 3.0, 4.5))
+    answer = observed_and_predicted(folder, (2.5, 3.0, 4.5))
     assert [*answer.predictions] == [3.5]
-    assert "within 2" in lines(answer, BICYCLE)[-1] and "NOT" not in lines(answer, BICYCLE)[-1]
+    assert "within 2" in observation_lines(answer, BICYCLE)[-1] and "NOT" not in observation_lines(answer, BICYCLE)[-1]
 
 
 def test_a_wrong_bicycle_is_noticed(folder):
     seen, wrong = observations(folder), BICYCLE.changed(trail=1.5 * BICYCLE.trail)
-    choice = chosen(wrong, TRUE, seen[:3], ())
-    assert np.abs(deviations(wrong, TRUE, choice, seen[3])).max() > 5.0
+    choice = ranked_suspects(wrong, TRUE, seen[:3], ())
+    assert np.abs(forecast_deviations(wrong, TRUE, choice, seen[3])).max() > 5.0
 
 
 @pytest.mark.parametrize(
@@ -100,6 +100,6 @@ def test_a_folder_without_windows_and_an_unknown_speed_are_refused(folder, tmp_p
     with pytest.raises(InputError, match=r"windows\.csv: no such file"):
         observations(tmp_path)
     with pytest.raises(InputError, match="no windows at this speed"):
-        measured(folder, (9.0,))
+        observed_and_predicted(folder, (9.0,))
     with pytest.raises(InputError, match="no such suspect"):
-        chosen(BICYCLE, Control(), observations(folder), ("fricton",))
+        ranked_suspects(BICYCLE, Control(), observations(folder), ("fricton",))

@@ -33,11 +33,26 @@ from validation.blind_spots.audit import (
     prepare,
 )
 from validation.blind_spots.probe import Told
-from validation.blind_spots.rewriting import ROOT, NoSuchFunction, function_of, rewritten, root_of, roots, text
-from validation.blind_spots.shared import candidates, compiled_functions, definitions, shared_functions, shared_modules
-from validation.blind_spots.sides import prepared, runs, sides
+from validation.blind_spots.rewriting import ROOT, NoSuchFunction, function_of, rewritten, root_of, roots_of_names, text
+from validation.blind_spots.shared import (
+    candidate_functions,
+    compiled_functions,
+    definitions,
+    shared_functions,
+    shared_modules,
+)
+from validation.blind_spots.sides import engines_of_functions, prepared_scene, runs_to_trace
 from validation.blind_spots.spoiling import scaled, spoiled
-from validation.blind_spots.table import WHY_HARMLESS, Line, harmless, kind_of, merged, read, uncovered, write
+from validation.blind_spots.table import (
+    WHY_HARMLESS,
+    Line,
+    harmless_functions,
+    kind_of,
+    merged_lines,
+    read,
+    uncovered_functions,
+    write,
+)
 from validation.report.blind_spots import blind_spots
 
 PLACE = 3
@@ -86,9 +101,13 @@ def test_a_function_without_a_fault_gives_what_it_is_given_itself_and_is_marked(
     values = np.array([0.5, 1.5])
     assert made({"other": PLACE})["other"](values) is values
     assert made({"other": PLACE + 1})["other"]("text") == "text"
-    assert memory.places(memory.RAN) == [PLACE, PLACE + 1] and memory.places(memory.NUMBERS) == [PLACE]
+    assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE, PLACE + 1] and memory.nonzero_functions(
+        memory.FUNCTIONS_WITH_NUMBERS
+    ) == [PLACE]
     memory.forget()
-    assert not memory.places(memory.RAN) and not memory.places(memory.NUMBERS)
+    assert not memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) and not memory.nonzero_functions(
+        memory.FUNCTIONS_WITH_NUMBERS
+    )
 
 
 def test_a_labelled_result_is_off_in_its_channels_and_keeps_its_labels_and_what_it_hands_on(fault):
@@ -108,13 +127,15 @@ def test_a_labelled_result_is_off_in_its_channels_and_keeps_its_labels_and_what_
     assert off.data["x"].attrs == given.data["x"].attrs and off.data.attrs == given.data.attrs
     assert off.detail.path is path and given["x"].tolist() == [0.5, 1.5]
     assert made({"other": PLACE})["other"]({"a": 0.5, "b": 2}) == {"a": 1.01 * 0.5, "b": 2}
-    assert memory.places(memory.NUMBERS) == [PLACE]
+    assert memory.nonzero_functions(memory.FUNCTIONS_WITH_NUMBERS) == [PLACE]
 
 
 def test_an_object_that_only_hands_on_others_has_no_number_of_its_own():
     handed = replace(line(), function=line())
     assert made({"other": PLACE})["other"](handed) is handed
-    assert memory.places(memory.RAN) == [PLACE] and not memory.places(memory.NUMBERS)
+    assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE] and not memory.nonzero_functions(
+        memory.FUNCTIONS_WITH_NUMBERS
+    )
     memory.forget()
 
 
@@ -143,7 +164,11 @@ def test_compiled_code_takes_a_fault_as_it_runs_and_compiles_nothing_for_it(faul
     values = np.array([0.5, 1.5])
     (number, count), array = both(0.3, values)
     assert (number, count, values.tolist(), array.tolist()) == (0.3, 2, [0.5, 1.5], [0.5, 1.5])
-    assert memory.places(memory.RAN) == memory.places(memory.NUMBERS) == [PLACE]
+    assert (
+        memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN)
+        == memory.nonzero_functions(memory.FUNCTIONS_WITH_NUMBERS)
+        == [PLACE]
+    )
     fault(0.01)
     (number, count), array = both(0.3, values)
     assert (number, count) == (1.01 * 0.3, 2)
@@ -154,7 +179,9 @@ def test_compiled_code_takes_a_fault_as_it_runs_and_compiles_nothing_for_it(faul
 
 def test_compiled_code_that_gives_no_number_is_marked_as_having_run():
     assert njit(lambda count: spoiled(count, PLACE))(3) == 3
-    assert memory.places(memory.RAN) == [PLACE] and not memory.places(memory.NUMBERS)
+    assert memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN) == [PLACE] and not memory.nonzero_functions(
+        memory.FUNCTIONS_WITH_NUMBERS
+    )
     memory.forget()
 
 
@@ -213,28 +240,28 @@ def test_a_function_of_python_is_shared_where_several_engines_call_it_in_one_sce
     traced += [
         {"run": ["a.toml", engine], "numbers": {"models.a.assumptions:judge"}} for engine in ("mujoco", "exudyn")
     ]
-    engines = sides(traced)
+    engines = engines_of_functions(traced)
     assert engines == {"models.a:both": ("exudyn", "mujoco", "reference")}
     assert kind_of("models.a:both", engines) == "Python exudyn mujoco reference"
     assert kind_of("models.tyre.bristles:tyre_forces", engines) == "compiled"
 
 
 def test_sides_are_runs_of_scenes_of_every_system_that_has_several_engines():
-    systems = {getattr(prepared(scene), "system", DEFAULT_SYSTEM) for scene, _ in runs()}
+    systems = {getattr(prepared_scene(scene), "system", DEFAULT_SYSTEM) for scene, _ in runs_to_trace()}
     assert systems == {name for name, system in SYSTEMS.items() if len(system.engines) > 1}
-    traces = [job.trace for job in (*jobs(False), *(Job([], [], [run]) for run in runs()))]
+    traces = [job.trace for job in (*jobs(False), *(Job([], [], [run]) for run in runs_to_trace()))]
     assert len({*traces}) == len(traces), "a trace of its own for each"
 
 
 def test_a_side_has_what_runs_after_its_scene_is_read_and_nothing_of_a_run_that_fails(tmp_path, monkeypatch):
     def mark(place, value):
-        memory.NUMBERS[place] = 1.0
+        memory.FUNCTIONS_WITH_NUMBERS[place] = 1.0
         if value == "none":
             raise RunFailed("none", "stopped", 0.0)
         return value
 
     told = Told({"out": tmp_path / "told.jsonl", "sound": [], "budgets": [9.0, 9.0]})
-    monkeypatch.setattr(probe, "prepared", lambda scene: mark(1, scene))
+    monkeypatch.setattr(probe, "prepared_scene", lambda scene: mark(1, scene))
     monkeypatch.setattr("models.systems.run", lambda scene, engine: mark(2, engine))
     for engine in ("exudyn", "none"):
         probe.run_scene("a.toml", engine, told)
@@ -255,8 +282,8 @@ def process(folder, faults, code):
     """What a new process prints, in which functions have faults."""
     doubles = folder / "memory"
     shared = memory.rows(doubles)[0]
-    for place in range(len(candidates())):
-        shared[place] = faults.get(candidates()[place], 0.0)
+    for place in range(len(candidate_functions())):
+        shared[place] = faults.get(candidate_functions()[place], 0.0)
     return float(subprocess.check_output([sys.executable, "-c", code], env=environment(folder, doubles), cwd=ROOT))
 
 
@@ -278,7 +305,7 @@ def line_of(probes, name, **case):
     """What is told of a function that one case runs, which has independent rows."""
     rows = [{"id": "contact_hertz.p0", "status": "passed", "independence": "closed form"}]
     item = {"case": "contact_hertz", "rows": rows, "seconds": 1.0, "ran": {name}, "numbers": {name}}
-    return Asked(probes, Traced(candidates(), {"contact_hertz": item | case}), True, {}).line_of(name)
+    return Asked(probes, Traced(candidate_functions(), {"contact_hertz": item | case}), True, {}).line_of(name)
 
 
 def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
@@ -319,7 +346,7 @@ def test_judges_and_all_others_make_one_line():
 def test_what_nothing_independent_notices_is_not_covered_and_so_is_what_has_no_line():
     lines = [line("models.a:f", rows="x.y", independent="x.y"), line("models.a:g", rows="x.y"), line("models.a:h")]
     names = ["models.a:f", "models.a:g", "models.a:h", "models.a:new"]
-    assert uncovered(lines, names) == {
+    assert uncovered_functions(lines, names) == {
         "noticed by nothing": ["models.a:h"],
         "noticed by nothing independent": ["models.a:g"],
         "not audited": ["models.a:new"],
@@ -328,17 +355,17 @@ def test_what_nothing_independent_notices_is_not_covered_and_so_is_what_has_no_l
 
 def test_what_nothing_runs_is_told_and_what_gives_no_number_needs_none():
     lines = [line("models.a:f", ended="not run"), line("models.a:g", ended="no numbers")]
-    assert uncovered(lines, ["models.a:f", "models.a:g"]) == {"run by nothing": ["models.a:f"]}
+    assert uncovered_functions(lines, ["models.a:f", "models.a:g"]) == {"run by nothing": ["models.a:f"]}
 
 
 def test_functions_whose_faults_change_no_value_are_told_apart_and_their_proofs_are_there():
-    for name, (why, proof) in harmless().items():
-        assert uncovered([], [name]) == {why: [name]} and why in WHY_HARMLESS
+    for name, (why, proof) in harmless_functions().items():
+        assert uncovered_functions([], [name]) == {why: [name]} and why in WHY_HARMLESS
         file, _, test = proof.partition("::")
-        assert name in candidates() and f"def {test}(" in (ROOT / file).read_text(), proof
+        assert name in candidate_functions() and f"def {test}(" in (ROOT / file).read_text(), proof
 
 
-VIEWS = [name for name, (why, _) in harmless().items() if why == WHY_HARMLESS[1]]
+VIEWS = [name for name, (why, _) in harmless_functions().items() if why == WHY_HARMLESS[1]]
 STATUSES = ("ask", "contact", "simplified")
 """Functions that return whole numbers: how a contact ended."""
 
@@ -363,7 +390,7 @@ def is_no_number(node, given):
 def test_a_function_that_hands_on_views_has_no_number_of_its_own(name):
     module, _, function = name.partition(":")
     parsed = function_of(ast.parse(text(module)), function)
-    given, values = roots(parsed), [each.value for each in ast.walk(parsed) if isinstance(each, ast.Return)]
+    given, values = roots_of_names(parsed), [each.value for each in ast.walk(parsed) if isinstance(each, ast.Return)]
     for node in ast.walk(parsed):
         if isinstance(node, ast.Assign) and any(
             isinstance(each, ast.Subscript | ast.Attribute) for each in node.targets
@@ -375,9 +402,9 @@ def test_a_function_that_hands_on_views_has_no_number_of_its_own(name):
 def test_lines_of_some_functions_take_the_place_of_the_kept_ones_and_lines_of_none_go():
     kept, new = [line("models.a:f"), line("models.a:g"), line("models.a:gone")], line("models.a:g", rows="x.y")
     functions = ["models.a:f", "models.a:g", "models.a:h"]
-    assert merged(kept, [new], functions) == [kept[0], new]
+    assert merged_lines(kept, [new], functions) == [kept[0], new]
     unknown = [line(name, ended="not audited") for name in ("models.a:h", "models.a:f")]
-    assert merged(kept, unknown, functions) == [kept[0], kept[1], unknown[0]]
+    assert merged_lines(kept, unknown, functions) == [kept[0], kept[1], unknown[0]]
 
 
 def test_an_audit_of_functions_that_there_are_none_of_is_refused(tmp_path):
@@ -398,7 +425,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path):
 def test_the_report_names_functions_of_the_sources_that_have_no_line(tmp_path):
     write([line("models.tyre.bristles:tyre_forces", rows="x.y", independent="x.y")], tmp_path / "table.csv")
     told = blind_spots(tmp_path / "table.csv")
-    assert "models.tyre.bristles:_mix" in told["uncovered"]["not audited"]
+    assert "models.tyre.bristles:_blend_directions" in told["uncovered"]["not audited"]
     assert "models.tyre.bristles:tyre_forces" not in told["uncovered"]["not audited"]
     assert told["modules"] == [("models.tyre.bristles", 1, 1, 1)] and told["commits"] == ["abc"]
 
@@ -408,6 +435,6 @@ def test_a_page_names_what_the_kept_audit_says_is_not_covered():
     assert not_covered.page(text) == text, "run python -m docs.not_covered"
     lines = read()
     assert lines
-    for names in uncovered(lines, [each.function for each in lines]).values():
+    for names in uncovered_functions(lines, [each.function for each in lines]).values():
         for name in names:
             assert f"`{name.replace('.<locals>', '')}`" in text

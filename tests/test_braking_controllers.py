@@ -7,13 +7,13 @@ from models.brake.brake import Brake
 from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.acceleration_phases import AccelerationPhases
-from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
-from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate_of_phase
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle
 from models.brake.controllers.per_wheel import SpeedEstimate
 from models.brake.controllers.slip import SlipBangBang, SlipPI
 from models.core.errors import InputError, RunFailed
-from models.tyre.magic_formula import surface
-from validation.braking.five_phase_exact import ExactWheel, cycle
+from models.tyre.magic_formula import table_of_surface
+from validation.braking.five_phase_exact import ExactWheel, last_cycle
 
 PHASES = FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
@@ -118,23 +118,23 @@ def test_parameters_that_cannot_be_used(name, parameters, word):
 
 
 def frozen(**changes):
-    return Frozen(
+    return WheelAtSpeed(
         **{
             "speed": 11.11,
             "load": 16.8e3,
             "radius": 0.5,
             "inertia": 13.35,
             "brake": LINE,
-            "tyre": surface("dry"),
+            "tyre": table_of_surface("dry"),
             **changes,
         }
     )
 
 
 def exact(wheel, controller=PHASES):
-    phases = [(1500.0 * rate(k, controller), *end_of_phase(k, controller)) for k in range(6)]
+    phases = [(1500.0 * rate_of_phase(k, controller), *end_of_phase(k, controller)) for k in range(6)]
     forces = wheel.load * wheel.tyre.mu_x[0, 0]
-    return cycle(ExactWheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12)
+    return last_cycle(ExactWheel(wheel.speed, wheel.radius, wheel.inertia, wheel.tyre.slips, forces), phases, 12)
 
 
 @pytest.mark.grounds("closed form")
@@ -153,4 +153,4 @@ def test_hysteresis_lengthens_the_cycle_and_a_wheel_that_locks_is_told():
     assert limit_cycle(frozen(brake=loop), PHASES, 1e-4).period > limit_cycle(frozen(), PHASES, 1e-4).period
     hasty = FivePhase(1, e1=0.1, e2=30.0, e3=20.0, e4=2.0, e5=200.0, falling=60.0, fast=40.0, slow=8.0)
     with pytest.raises(RunFailed, match="phase"):
-        limit_cycle(frozen(tyre=surface("ice")), hasty, 1e-4)
+        limit_cycle(frozen(tyre=table_of_surface("ice")), hasty, 1e-4)

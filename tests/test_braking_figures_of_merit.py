@@ -5,7 +5,7 @@ import pytest
 
 from models.brake import figures_of_merit as merit
 from models.core.errors import InputError
-from models.systems.braking.stops import Scatter, scatter, welch
+from models.systems.braking.stops import Scatter, scatter_of, welch_test
 
 PAPER = merit.Axles(front=33_600.0, rear=21_800.0, wheelbase=3.61, height=1.2)
 
@@ -17,15 +17,19 @@ def uniform(speed=20.0, deceleration=5.0, step=0.0055):
 
 
 def test_the_constants_of_the_regulation_follow_from_its_speeds():
-    assert merit.braking_rate(40 * merit.KMH, 20 * merit.KMH, 1.0) == pytest.approx(0.566, abs=5e-4)
-    assert merit.braking_rate(45 * merit.KMH, 15 * merit.KMH, 1.0) == pytest.approx(0.849, abs=5e-4)
+    assert merit.braking_rate(
+        40 * merit.METRES_PER_SECOND_OF_KMH, 20 * merit.METRES_PER_SECOND_OF_KMH, 1.0
+    ) == pytest.approx(0.566, abs=5e-4)
+    assert merit.braking_rate(
+        45 * merit.METRES_PER_SECOND_OF_KMH, 15 * merit.METRES_PER_SECOND_OF_KMH, 1.0
+    ) == pytest.approx(0.849, abs=5e-4)
 
 
 def test_a_uniform_stop_has_its_deceleration_by_every_definition():
     times, way, speeds = uniform()
     assert merit.mean_fully_developed(times, way, speeds) == pytest.approx(5.0, rel=1e-12)
     assert merit.equivalent_deceleration(20.0, way[-1]) == pytest.approx(5.0, rel=1e-12)
-    assert merit.crossing(times, speeds, 10.0) == pytest.approx(2.0, rel=1e-12)
+    assert merit.crossing_time(times, speeds, 10.0) == pytest.approx(2.0, rel=1e-12)
 
 
 def test_mean_fully_developed_leaves_out_build_up_and_creep():
@@ -43,7 +47,7 @@ def test_one_friction_on_both_axles_gives_itself_back_and_is_wholly_used():
     rear = (k * PAPER.rear + 0.010 * PAPER.front) / (1.0 + k * lift) / PAPER.weight
     assert merit.adhesion_front(front, PAPER) == k and merit.adhesion_rear(rear, PAPER) == k
     assert merit.adhesion_of_vehicle(k, k, k, PAPER) == pytest.approx(k, rel=1e-12)
-    assert sum(PAPER.dynamic(0.4)) == pytest.approx(PAPER.weight, rel=1e-12)
+    assert sum(PAPER.dynamic_loads(0.4)) == pytest.approx(PAPER.weight, rel=1e-12)
 
 
 def test_split_friction_asks_for_the_larger_of_both():
@@ -66,14 +70,14 @@ def test_locks_are_told_by_wheel_above_a_speed_alone():
     locked = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 1]], bool)
     table = merit.lock_table(np.full(5, 0.1), locked, np.array([9.0, 8.0, 7.0, 6.0, 1.0]))
     assert table.time == pytest.approx([0.3, 0.3]) and table.share == pytest.approx([0.75, 0.75])
-    assert table.longest == pytest.approx([0.2, 0.3])
+    assert table.longest_lock == pytest.approx([0.2, 0.3])
 
 
 def test_welch_is_that_of_a_worked_example():
     # means 5 and 7, variances 4 and 9, 10 and 12 values: t = 2 / sqrt(0.4 + 0.75), freedoms 1.3225 / 0.0689
-    found = welch(Scatter(10, 5.0, 2.0), Scatter(12, 7.0, 3.0))
+    found = welch_test(Scatter(10, 5.0, 2.0), Scatter(12, 7.0, 3.0))
     assert found.t == pytest.approx(2.0 / np.sqrt(1.15)) and found.freedoms == pytest.approx(19.19, abs=0.01)
     from scipy.stats import ttest_ind_from_stats
 
-    assert found.p == pytest.approx(ttest_ind_from_stats(5.0, 2.0, 10, 7.0, 3.0, 12, equal_var=False).pvalue)
-    assert scatter(np.array([1.0, 3.0])).deviation == pytest.approx(np.sqrt(2.0))
+    assert found.p_value == pytest.approx(ttest_ind_from_stats(5.0, 2.0, 10, 7.0, 3.0, 12, equal_var=False).pvalue)
+    assert scatter_of(np.array([1.0, 3.0])).deviation == pytest.approx(np.sqrt(2.0))

@@ -5,18 +5,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from models.brake.trailer import CHOSEN
+from models.brake.trailer import CHOSEN_TRAILER
 from models.systems.braking.adhesion import utilisation
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
-from studies.braking_figures import on_ground, outlines
+from studies.braking_figures import on_ground, unit_outlines
 
 TABLE = {
     "title": "t",
     "system": "braking",
     "controller": {"kind": "slip_bang_bang"},
-    "trailer": CHOSEN.model_dump(),
+    "trailer": CHOSEN_TRAILER.model_dump(),
     "procedures": {"stop": {"speed": 10.0}},
 }
 
@@ -38,11 +38,13 @@ def test_hitch_angles_are_of_the_drawbar_against_the_truck():
 @pytest.mark.grounds("closed form")
 def test_the_train_is_drawn_where_its_hinges_are():
     scene = build(TABLE)
-    (_, truck), (drawbar, line), (body, box) = outlines(scene)
+    (_, truck), (drawbar, line), (body, box) = unit_outlines(scene)
     positions = np.array([10.0, 5.0, 0.0, np.pi / 2.0, 0.0])  # the drawbar across
     plane = plane_of(scene)
     hook, hinge = on_ground(drawbar, line, positions, plane)
-    assert hook == pytest.approx([10.0 + CHOSEN.hook, 5.0]) and hinge == pytest.approx(hook - [0.0, CHOSEN.drawbar])
+    assert hook == pytest.approx([10.0 + CHOSEN_TRAILER.hook, 5.0]) and hinge == pytest.approx(
+        hook - [0.0, CHOSEN_TRAILER.drawbar]
+    )
     ahead = on_ground(body, box, positions, plane)
     assert ahead[:2].mean(axis=0) - hinge == pytest.approx([1.2, 0.0])
     assert on_ground(0, truck, positions, plane).max(axis=0) == pytest.approx([10.0 + 1.42 + 1.2, 6.1])
@@ -51,7 +53,7 @@ def test_the_train_is_drawn_where_its_hinges_are():
 @pytest.mark.full
 def test_adhesion_of_every_axle_of_a_train_is_that_of_its_tyres():
     found = utilisation(build(TABLE), "ice")
-    k = np.array([found.k.front, found.k.rear, *found.k.trailer])
+    k = np.array([found.adhesion.front, found.adhesion.rear, *found.adhesion.trailer])
     # friction peaks at 0.172; Annex 13 takes 0.010 or 0.015 of the truck's other axle off, which does not roll so here
     assert k.size == 4 and ((k > 0.14) & (k < 0.172)).all() and k[2:].min() > 0.155
     assert k.min() <= found.k_vehicle <= k.max() and 0.75 < found.epsilon < 1.05

@@ -7,15 +7,15 @@ import pytest
 
 from models.brake.advance import AT_REST
 from models.brake.brake import Brake
-from models.brake.controllers.five_phase_cycle import Frozen, go_on
-from models.brake.plane_chain import factor, headings, inertia, solve
-from models.brake.plane_step import SPREAD
-from models.brake.plane_vehicle import GRAVITY, PAPER, truck
-from models.brake.trailer import CHOSEN, hooked, train
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed, go_on
+from models.brake.plane_chain import factorise_mass, fill_headings, inertia, solve
+from models.brake.plane_step import JUMP_WIDTH
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
+from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_train
 from models.engines.braking import set_held
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked
-from validation.braking.braked_truck import RollingTruck, constant, on_road, truck_on
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on
 
 MU = 0.4
 LOCKING = np.full(4, 1e14)
@@ -45,20 +45,22 @@ def plain_mass(q, plane):
 
 @pytest.mark.grounds("plain counterpart")
 @pytest.mark.parametrize(
-    "plane", [truck(PAPER), train(PAPER, CHOSEN), hooked(CHOSEN)], ids=["truck", "train", "hooked"]
+    "plane",
+    [plane_of_truck(PAPER_TRUCK), plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER), plane_of_trailer(CHOSEN_TRAILER)],
+    ids=["truck", "train", "hooked"],
 )
 def test_forces_give_the_accelerations_of_the_mass_matrix_by_energy(plane):
     """At rest; coordinates that are prescribed do not take part."""
     random, units = np.random.default_rng(3), plane.masses.size
     q, n = random.uniform(-0.5, 0.5, 2 + units), 2 + units
     mass, right, along, across, ways = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty((units, 2))
-    headings(q, ways)
+    fill_headings(q, ways)
     inertia(ways, np.zeros(n), plane, mass, right, along, across)
-    factor(mass, plane)
+    factorise_mass(mass, plane)
     forces = random.normal(0.0, 1e4, n)
     accelerations = forces.copy()
     solve(mass, plane, accelerations)
-    free = slice(2 if plane.hooked else 0, n)
+    free = slice(2 if plane.has_prescribed_hook else 0, n)
     expected = np.linalg.solve(plain_mass(q, plane)[free, free], forces[free])
     assert not right.any() and accelerations[free] == pytest.approx(expected, rel=1e-7)
 
@@ -66,7 +68,7 @@ def test_forces_give_the_accelerations_of_the_mass_matrix_by_energy(plane):
 @pytest.mark.grounds("closed form")
 def test_wheels_act_on_a_train_by_the_work_of_their_forces():
     """Generalised forces are the derivatives of F . r by the engine's coordinates: place, heading, angles of hinges."""
-    plane, random = train(PAPER, CHOSEN), np.random.default_rng(4)
+    plane, random = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER), np.random.default_rng(4)
     units, wheels = plane.masses.size, plane.wheels
     steer, held = random.uniform(-0.2, 0.2, wheels), random.normal(0.0, 5e3, (2, wheels))
     q = random.uniform(-0.5, 0.5, 2 + units)
@@ -96,12 +98,12 @@ def test_wheels_act_on_a_train_by_the_work_of_their_forces():
 @pytest.mark.parametrize("speed", [10.0, 0.3])
 def test_locked_wheels_stop_in_the_time_of_coulomb_s_friction(speed):
     """t = v / (mu g), and the wheels bear mu m g on the way; at a walking pace steps are cut into parts."""
-    plane = truck(PAPER)
+    plane = plane_of_truck(PAPER_TRUCK)
     still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
-    moving = RollingTruck(truck_on(constant(MU), still), speed)
+    moving = RollingTruck(truck_on(constant_friction(MU), still), speed)
     moving.on(np.tile(LOCKING, (2, 1)), 5.5e-3)
     forces, loads = -moving.report.force_x.sum(), moving.report.load.sum()
-    assert (loads, forces) == pytest.approx((PAPER.mass * GRAVITY, MU * PAPER.mass * GRAVITY), rel=1e-6)
+    assert (loads, forces) == pytest.approx((PAPER_TRUCK.mass * GRAVITY, MU * PAPER_TRUCK.mass * GRAVITY), rel=1e-6)
     status = 0
     while status != AT_REST:
         status, _ = moving.on(np.tile(LOCKING, (2, 1)), 5.5e-3)
@@ -112,7 +114,7 @@ def test_locked_wheels_stop_in_the_time_of_coulomb_s_friction(speed):
 def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     """J (w1 - w0) = r int F dt - int T dt, where pressure and torque rise on the brake's upward line."""
     brake = Brake(push_out=0.5, release=0.5, rising=1500.0, falling=1500.0)
-    frozen = Frozen(20.0, 4e3, 0.3, 1.2, brake, surface("dry"))
+    frozen = WheelAtSpeed(20.0, 4e3, 0.3, 1.2, brake, table_of_surface("dry"))
     start = frozen.rolling()._replace(pressure=0.6, torque=150.0)
     end = go_on(start, 40.0, 2e-3, frozen.driven)
     assert (end.time, end.pressure, end.torque) == pytest.approx((2e-3, 0.68, 1500.0 * (0.68 - 0.5)), rel=1e-12)
@@ -126,7 +128,7 @@ def falling() -> Tables:
     along = np.broadcast_to(np.array([0.0, 2.0 * MU, MU]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [MU], [MU]])
-    return stacked([TyreTable(*nodes, along, g, h)])
+    return stacked_tables([TyreTable(*nodes, along, g, h)])
 
 
 @pytest.mark.grounds("closed form")
@@ -135,22 +137,22 @@ def test_wheels_at_the_edge_of_locking_bear_the_load_that_just_locks_them(inerti
     """r mu N = T: a little more load, and the rear wheels roll at once, with more friction, which takes the load away.
 
     Loads give the acceleration by load transfer, and this the forces; the front wheels are locked. The jump is closed
-    in to ``SPREAD`` on both sides.
+    in to ``JUMP_WIDTH`` on both sides.
     """
-    plane = truck(PAPER)._replace(spin=np.full(4, inertia))
+    plane = plane_of_truck(PAPER_TRUCK)._replace(spin=np.full(4, inertia))
     load = (plane.static - plane.by_x * MU * GRAVITY) * (1.0 - share)  # a little less than behind if all are locked
     torques = np.where(plane.place[:, 0] < 0.0, plane.radius * MU * load, LOCKING)
     moving = RollingTruck(on_road(plane, falling(), slope=1e-6), speed)
     moving.turning[:] = 0.0
     moving.on(torques, step)
-    lift, mass = PAPER.mass * PAPER.height / (2.0 * PAPER.wheelbase), PAPER.mass
+    lift, mass = PAPER_TRUCK.mass * PAPER_TRUCK.height / (2.0 * PAPER_TRUCK.wheelbase), PAPER_TRUCK.mass
     slowing = (plane.static[2] - load[2]) / lift
     loads = plane.static + lift * slowing * np.array([1.0, 1.0, -1.0, -1.0])
     front = MU * loads[0]
     rear = 0.5 * mass * slowing - front
     report = moving.report
     assert rear > 1.01 * MU * loads[2]  # not locked all the time, nor rolling
-    assert -moving.motion.accelerations[0] == pytest.approx(slowing, abs=2.0 * SPREAD)
-    assert report.load == pytest.approx(loads, abs=2.0 * lift * SPREAD)
-    assert -report.force_x == pytest.approx([front, front, rear, rear], abs=2.0 * mass * SPREAD)
+    assert -moving.motion.accelerations[0] == pytest.approx(slowing, abs=2.0 * JUMP_WIDTH)
+    assert report.load == pytest.approx(loads, abs=2.0 * lift * JUMP_WIDTH)
+    assert -report.force_x == pytest.approx([front, front, rear, rear], abs=2.0 * mass * JUMP_WIDTH)
     assert report.force_x.sum() == pytest.approx(mass * moving.motion.accelerations[0], rel=1e-12)

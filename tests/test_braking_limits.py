@@ -5,12 +5,12 @@ import pytest
 
 from models.brake.controller import SLOW, Command, Sample
 from models.brake.plane_step import share_out
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, checked_answer
 from models.brake.quarter import Quarter
-from models.brake.trailer import CHOSEN, train
+from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.procedures import ready
+from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking.random_stops import random_stop
@@ -26,7 +26,7 @@ def scene(**tables):
 @pytest.mark.parametrize("loads", [(9e3, 24e3, -4e3, 26e3), (-1.0, 30e3, 8e3, 17e3), (20e3, 25e3, -2e3, 12e3)])
 @pytest.mark.grounds("closed form")
 def test_three_wheels_that_stay_hold_weight_and_moments(loads):
-    place, shared = truck(PAPER).place, np.array(loads)
+    place, shared = plane_of_truck(PAPER_TRUCK).place, np.array(loads)
     share_out(shared, place)
     assert shared.min() >= 0.0 and shared.sum() == pytest.approx(sum(loads), rel=1e-12)
     assert shared @ place == pytest.approx(np.array(loads) @ place, rel=1e-9)
@@ -36,7 +36,7 @@ def test_three_wheels_that_stay_hold_weight_and_moments(loads):
 @pytest.mark.grounds("closed form")
 def test_beyond_balance_two_wheels_bear_nothing(loads, side):
     shared = np.array(loads)
-    share_out(shared, truck(PAPER).place)
+    share_out(shared, plane_of_truck(PAPER_TRUCK).place)
     assert (shared[list(side)] == 0.0).all() and shared.sum() == pytest.approx(sum(loads))
 
 
@@ -50,7 +50,7 @@ def test_a_stop_at_the_edge_of_locking_finishes():
             procedures=steered,
         )
     ).detail
-    assert path.stands and path.times[-1] == pytest.approx(2.301, abs=0.01)
+    assert path.ended_at_rest and path.times[-1] == pytest.approx(2.301, abs=0.01)
 
 
 def test_random_stops_are_the_same_for_the_same_numbers_and_are_built():
@@ -93,9 +93,9 @@ def test_what_cannot_be_is_refused_with_its_value():
     with pytest.raises(ControllerFailed, match="wrong frame: complex"):
         checked_answer(Command(pressures=np.full(4, 1j)), GIVEN)
     with pytest.raises(InputError, match=r"mass = 0.1: must be above 322.8 kg"):
-        ready(scene(vehicle={"override": {"mass": 0.1}}), "stop")
+        vehicle_and_start(scene(vehicle={"override": {"mass": 0.1}}), "stop")
     with pytest.raises(InputError, match=r"mass = 200.0: must be above"):
-        train(PAPER, CHOSEN.model_copy(update={"mass": 100.0, "drawbar_mass": 100.0}))
+        plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"mass": 100.0, "drawbar_mass": 100.0}))
     with pytest.raises(ValueError, match="J / r"):
         Quarter(mass=50.0, radius=0.5, spin_inertia=13.35)
     with pytest.raises(InputError, match=r"brakes.supply = 10000.0: must be at most 300 bar"):
@@ -108,7 +108,7 @@ def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
     with pytest.raises(RunFailed, match=r"jackknifes: the drawbar against the truck at -?\d+\.\d deg, limit") as told:
         run(
             scene(
-                trailer=CHOSEN.model_copy(update={"fold": 0.02}).model_dump(),
+                trailer=CHOSEN_TRAILER.model_copy(update={"fold": 0.02}).model_dump(),
                 run={"duration": 6.0},
                 brakes={"supply": 2.0},
                 procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}},

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from models.brake.advance import AT_REST, advance
-from models.brake.plane_vehicle import GRAVITY, PAPER, truck
-from models.brake.trailer import CHOSEN, follow, hooked
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
+from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
 from models.engines.braking import CarriedChassis
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
-    ICE,
+    ICE_TABLE,
     RollingTruck,
-    constant,
+    constant_friction,
     sideways_with_locked_front_wheels,
     transfer_errors,
     truck_on,
@@ -31,16 +31,16 @@ def turning(speed, yaw=0.0, side=0.0):
 @pytest.mark.grounds("closed form")
 def test_locked_wheels_stop_in_the_closed_form():
     for step in (1e-4, 5.5e-3, 2e-2):
-        state = RollingTruck(truck_on(constant(0.4)), 10.0).braked(LOCKING, step).state
+        state = RollingTruck(truck_on(constant_friction(0.4)), 10.0).braked(LOCKING, step).state
         # the wheels' own stop, v / r in J v / (r T) = 0.3 ms, gives back less force than a locked wheel has
         assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=2e-3)
         assert not state[1].any()
-    state = _locked_from_the_start(constant(0.4)).state
+    state = _locked_from_the_start(constant_friction(0.4)).state
     assert state[0, 0] == pytest.approx(100.0 / (2.0 * 0.4 * GRAVITY), rel=1e-9)
 
 
 def _locked_from_the_start(tables):
-    plane = truck(PAPER)
+    plane = plane_of_truck(PAPER_TRUCK)
     still = plane._replace(radius=plane.radius * 1e9)  # wheels that turn at next to no speed: locked at once
     return RollingTruck(truck_on(tables, still), 10.0).braked(LOCKING * 1e9)
 
@@ -86,7 +86,7 @@ def test_backwards_is_forwards_seen_from_behind():
 def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
     own, carried = (
         RollingTruck(truck_on(), 10.0, steer=0.03, step_function=go).braked(ROLLING, 1e-3, duration=0.5).state
-        for go in (advance, CarriedChassis(engine, truck(PAPER)).advance)
+        for go in (advance, CarriedChassis(engine, plane_of_truck(PAPER_TRUCK)).advance)
     )
     assert own[0, 1] > 0.05
     assert carried == pytest.approx(own, abs=1e-6)  # both are of order two
@@ -94,7 +94,7 @@ def test_engines_carry_the_chassis_as_the_compiled_step_does(engine):
 
 @pytest.mark.full
 def test_the_truck_written_out_turns_as_the_compiled_one():
-    where = braked_turn(PAPER, ICE, 0.03, (900.0, 600.0), 11.11, 6.0)
+    where = braked_turn(PAPER_TRUCK, ICE_TABLE, 0.03, (900.0, 600.0), 11.11, 6.0)
     state = RollingTruck(truck_on(), 11.11, steer=0.03).braked(ROLLING, 1e-3, duration=where.time).state
     assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
 
@@ -103,15 +103,17 @@ def rolling(slope: float) -> Tables:
     """Friction across the wheel alone, as steep as ``slope`` (1/rad)."""
     mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
-    return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
+    return stacked_tables([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
 
 @pytest.mark.full
 def test_trailer_on_a_straight_pull():
     v, step, n = 0.2, 5e-4, 8000
-    state = np.array([[0.0, 0.0, 0.5, 0.5], [v, 0.0, -v * np.sin(0.5) / CHOSEN.drawbar, 0.0]])
+    state = np.array([[0.0, 0.0, 0.5, 0.5], [v, 0.0, -v * np.sin(0.5) / CHOSEN_TRAILER.drawbar, 0.0]])
     hook = np.tile([v, 0.0], (n + 1, 1))
-    states, forces = follow(hooked(CHOSEN), rolling(100.0), state, hook, step, 100.0, np.zeros(4))
-    angle = 2.0 * np.arctan(np.tan(0.25) * np.exp(-v * n * step / CHOSEN.drawbar))
+    states, forces = follow_hook(
+        plane_of_trailer(CHOSEN_TRAILER), rolling(100.0), state, hook, step, 100.0, np.zeros(4)
+    )
+    angle = 2.0 * np.arctan(np.tan(0.25) * np.exp(-v * n * step / CHOSEN_TRAILER.drawbar))
     assert states[-1, 0, 2] == pytest.approx(angle, rel=1e-4)
     assert np.hypot(*forces[-1]) < 50.0  # it only rolls

@@ -17,27 +17,27 @@ import pytest
 import models.brake.port as port
 from models.brake.brake import PAPER_FRONT, PAPER_REAR, of_wheels
 from models.brake.controller import SAMPLE, Command, Sample
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.port import frame, socket_port
 from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.callable import named_controller
 from models.brake.port.client import serve
 from models.brake.port.example import Example
-from models.brake.port.faults import Fault, Faulty
+from models.brake.port.faults import Fault, FaultyController
 from models.brake.port.pace import WallClock
-from models.brake.port.sensors import Conversion, sensed
-from models.brake.port.setup import ControllerRun, PortTable, opened
-from models.brake.port.socket_port import connected
+from models.brake.port.sensors import Conversion, controller_behind_sensors
+from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
+from models.brake.port.socket_port import controller_behind_socket
 from models.brake.port.teeth import Counted, Teeth
 from models.brake.pressure import Chambers
 from models.brake.surfaces import Stretch, road
 from models.core.errors import InputError, RunFailed
 from models.core.strict import read
-from models.systems.braking.march import Braked
+from models.systems.braking.march import BrakedVehicle
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import stacked_tables
 
 HERE = Path(port.__path__[0])
 SHORT = 0.2
@@ -65,12 +65,12 @@ def held(given):
 @pytest.fixture(scope="module")
 def vehicle():
     chambers = Chambers(np.full(4, 0.05), np.full(4, 0.05), 6.0)
-    ice = surface("ice")
+    ice = table_of_surface("ice")
     brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
-    return Braked(
-        plane=truck(PAPER),
+    return BrakedVehicle(
+        plane=plane_of_truck(PAPER_TRUCK),
         kind=np.zeros(4, dtype=np.int64),
-        tables=stacked([ice]),
+        tables=stacked_tables([ice]),
         slope=ice.cornering,
         road=road([Stretch(0.0, 0, 0)]),
         brakes=brakes,
@@ -101,7 +101,7 @@ def client(behave, timeout=0.1):
         with socket.create_connection(("127.0.0.1", number)) as link:
             behave(link)
 
-    with socket_port.listening() as server:
+    with socket_port.listening_socket() as server:
         thread = threading.Thread(target=act, args=(server.getsockname()[1],))
         thread.start()
         link = server.accept()[0]
@@ -114,25 +114,25 @@ def client(behave, timeout=0.1):
 
 
 def test_frames_are_as_documented():
-    raw = frame.question(of(3))
+    raw = frame.question_frame(of(3))
     assert len(raw) == 104 and raw[:4] == b"TRQ1" and raw[16:18] == b"\x04\x03" and not any(raw[18:24])
     assert int.from_bytes(raw[4:8], "little") == 3 and int.from_bytes(raw[8:16], "little") == 16_500_000
     assert np.frombuffer(raw, "<f8", offset=24).tolist() == [6.0, 11.0, 11.0, 10.0, 9.0, 8.0, 0.0, 0.0, 0.0, 0.0]
-    back = frame.sample(raw)
+    back = frame.sample_of_question(raw)
     assert (back.number, back.time, back.brake, back.wheels.tolist()) == (3, 16_500_000, True, [11.0, 10.0, 9.0, 8.0])
-    said = frame.answer(3, Command(pressures=np.array([0.1, 0.2, 0.3, 1e-300])))
+    said = frame.answer_frame(3, Command(pressures=np.array([0.1, 0.2, 0.3, 1e-300])))
     assert len(said) == 80 and said[:4] == b"TRA1" and said[8:10] == b"P\x04"
-    assert frame.command(said, 3).pressures.tolist() == [0.1, 0.2, 0.3, 1e-300]
+    assert frame.command_of_answer(said, 3).pressures.tolist() == [0.1, 0.2, 0.3, 1e-300]
 
 
 def test_a_speed_that_is_not_given_is_told_so():
-    raw = frame.question(of(speed=np.nan))
-    assert raw[17] == frame.SWITCH and np.isnan(frame.sample(raw).speed)
+    raw = frame.question_frame(of(speed=np.nan))
+    assert raw[17] == frame.SWITCH and np.isnan(frame.sample_of_question(raw).speed)
 
 
 def test_a_thread_at_the_socket_gives_the_same_bits(vehicle):
     answered = []
-    with socket_port.listening() as server:
+    with socket_port.listening_socket() as server:
         number = server.getsockname()[1]
         thread = threading.Thread(target=lambda: answered.append(serve(Example(4), number)))
         thread.start()
@@ -150,7 +150,7 @@ def test_the_client_in_c_gives_the_same_bits(vehicle, tmp_path):
     source = HERE / "client_example.c"
     words = ["cc", "-O2", "-Wall", "-Werror", "-ffp-contract=off", "-o", str(program), str(source)]
     subprocess.run(words, check=True)
-    with connected([str(program), "{port}"], 0, PATIENT, PATIENT) as other:
+    with controller_behind_socket([str(program), "{port}"], 0, PATIENT, PATIENT) as other:
         path = vehicle.run(other, 11.0, SHORT)
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
@@ -159,7 +159,7 @@ def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     builder = pytest.importorskip("pythonfmu").FmuBuilder
     file = builder.build_FMU(HERE / "example_slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=PATIENT, start=PATIENT)
-    with opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
+    with controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)) as (other, _):
         path = vehicle.run(other, 11.0, SHORT)
     assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
@@ -183,7 +183,7 @@ def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=time_out(name, 0.5), start=PATIENT)
     run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), opened(table, run, Example(4)) as (other, _):
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         ask(other, of())
     assert time.perf_counter() - begun < PATIENT
@@ -193,7 +193,7 @@ def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
     (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
     table, run = PortTable(fmu="a.fmu"), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), opened(table, run, Example(4)):
+    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), controller_of_run(table, run, Example(4)):
         pass
 
 
@@ -202,7 +202,7 @@ def test_a_file_that_is_no_fmu(tmp_path):
     table = PortTable(fmu="a.fmu")
     with (
         pytest.raises(InputError, match="no FMU"),
-        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
     ):
         pass
 
@@ -212,7 +212,7 @@ def _said(**changes):
 
     def behave(link):
         number = int.from_bytes(link.recv(104)[4:8], "little")
-        raw = bytearray(frame.answer(number, Command(pressures=np.array([1.0, 1.0, 1.0, 1.0]))))
+        raw = bytearray(frame.answer_frame(number, Command(pressures=np.array([1.0, 1.0, 1.0, 1.0]))))
         for place, value in changes.get("bytes", {}).items():
             raw[place : place + len(value)] = value
         link.sendall(bytes(raw)[: changes.get("cut", 80)] + b"x" * changes.get("more", 0))
@@ -337,7 +337,7 @@ def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, c
         "        return Command(valves=np.ones(4))\n"
     )
     run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with opened(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
+    with controller_of_run(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
         ask(other, of())
     said = capfd.readouterr()
     assert said.out == "" and "noise" in said.err
@@ -359,7 +359,7 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
     )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)
     run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), opened(table, run, Example(4)) as (other, _):
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         ask(other, of())
     assert time.perf_counter() - begun < PATIENT
@@ -376,7 +376,7 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
         table = PortTable(callable="made.py:Made", start=start)
         with (
             pytest.raises(RunFailed, match=told),
-            opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+            controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
         ):
             pass
 
@@ -397,7 +397,7 @@ def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.4 s; .* give start"),
-        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
+        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -410,7 +410,11 @@ def test_an_fmu_that_is_never_ready_ends_as_an_answer_does(tmp_path):
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
     table, run = PortTable(fmu=Path(file).name, timeout=0.8), ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     (tmp_path / "begun").touch()
-    with chdir(tmp_path), pytest.raises(RunFailed, match=r"not made within 0.8 s"), opened(table, run, Example(4)):
+    with (
+        chdir(tmp_path),
+        pytest.raises(RunFailed, match=r"not made within 0.8 s"),
+        controller_of_run(table, run, Example(4)),
+    ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
 
@@ -427,7 +431,7 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     table = PortTable(command=["sleep", "30"], timeout=0.2)
     begun = time.perf_counter()
     with pytest.raises(RunFailed, match=r"nobody connected to .* within 0.2 s; .* give start"):
-        opened(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
+        controller_of_run(table, ControllerRun(RADIUS, SAMPLE, folder=tmp_path), Example(4)).__enter__()
     assert time.perf_counter() - begun < 2 * table.timeout
     assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0
 
@@ -440,7 +444,10 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
 def test_nonsense_is_named_before_sensors_faults_and_log_can_hide_it(table, answer, name, tmp_path):
     run = ControllerRun(RADIUS, SAMPLE, folder=tmp_path)
     failing = Says(answer)
-    with opened(read(PortTable, table, ""), run, failing) as (other, _), pytest.raises(ControllerFailed, match=name):
+    with (
+        controller_of_run(read(PortTable, table, ""), run, failing) as (other, _),
+        pytest.raises(ControllerFailed, match=name),
+    ):
         ask(other, of())
 
 
@@ -451,30 +458,33 @@ def test_a_failed_run_keeps_what_it_recorded(vehicle):
     with pytest.raises(ControllerFailed, match="sample 5: crash") as told:
         vehicle.run(Says(dies), 11.0, SHORT)
     partial = told.value.partial
-    assert len(partial.times) == 6 and not partial.stands and partial.reports.load.shape == (5, 4)
+    assert len(partial.times) == 6 and not partial.ended_at_rest and partial.reports.load.shape == (5, 4)
     assert np.array_equal(partial.states, vehicle.run(Says(held), 11.0, 5 * SAMPLE).states)
 
 
 def test_a_command_that_ends_at_once_and_one_that_never_connects(monkeypatch):
-    monkeypatch.setattr(socket_port, "GRACE", 0.01)
-    early = connected(["sh", "-c", "exit 3"], 0, 1.0, PATIENT)
+    monkeypatch.setattr(socket_port, "GRACE_SECONDS", 0.01)
+    early = controller_behind_socket(["sh", "-c", "exit 3"], 0, 1.0, PATIENT)
     with pytest.raises(RunFailed, match="status 3 before it connected"), early:
         pass
-    with pytest.raises(RunFailed, match="nobody connected to"), connected(["sleep", "30"], 0, 1.0, 0.1):
+    with pytest.raises(RunFailed, match="nobody connected to"), controller_behind_socket(["sleep", "30"], 0, 1.0, 0.1):
         pass
-    with pytest.raises(InputError, match="cannot be started"), connected(["/no/such/program"], 0, 1.0, 0.1):
+    with (
+        pytest.raises(InputError, match="cannot be started"),
+        controller_behind_socket(["/no/such/program"], 0, 1.0, 0.1),
+    ):
         pass
 
 
 def test_no_process_stays(monkeypatch, tmp_path):
-    monkeypatch.setattr(socket_port, "GRACE", 0.01)
+    monkeypatch.setattr(socket_port, "GRACE_SECONDS", 0.01)
     code = (
         "import os, socket, subprocess, sys\n"
         "open('parent', 'w').write(str(os.getpid()))\n"
         "open('child', 'w').write(str(subprocess.Popen(['sleep', '600']).pid))\n"
         "link = socket.create_connection(('127.0.0.1', int(sys.argv[1])))\nos.wait()\n"
     )
-    with connected([sys.executable, "-S", "-c", code, "{port}"], 0, PATIENT, PATIENT, tmp_path):
+    with controller_behind_socket([sys.executable, "-S", "-c", code, "{port}"], 0, PATIENT, PATIENT, tmp_path):
         pass
     for name in ("parent", "child"):
         number = int((tmp_path / name).read_text())
@@ -487,33 +497,33 @@ def test_no_process_stays(monkeypatch, tmp_path):
 
 
 def test_the_socket_listens_on_this_machine_alone():
-    with socket_port.listening() as server:
+    with socket_port.listening_socket() as server:
         assert server.getsockname()[0] == "127.0.0.1"
 
 
 def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
     run = ControllerRun(RADIUS, SAMPLE, "a scene", tmp_path)
-    with opened(PortTable(log="a.log"), run, Example(4)) as (own, _):
+    with controller_of_run(PortTable(log="a.log"), run, Example(4)) as (own, _):
         path = vehicle.run(own, 11.0, SHORT)
-    with opened(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
+    with controller_of_run(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
         assert same(path, vehicle.run(replayed, 11.0, SHORT))
     with (
-        opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
         pytest.raises(RunFailed, match="was asked something else"),
     ):
         vehicle.run(replayed, np.nextafter(11.0, 12.0), SHORT)
     with (
-        opened(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
         pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"),
     ):
         vehicle.run(replayed, 11.0, SHORT + 0.1)
     with (
         pytest.raises(InputError, match="another scene"),
-        opened(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
+        controller_of_run(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "another", tmp_path), Example(4)),
     ):
         pass
     (tmp_path / "no.log").write_bytes(b"no")
-    with pytest.raises(InputError, match="no log"), opened(PortTable(replay="no.log"), run, Example(4)):
+    with pytest.raises(InputError, match="no log"), controller_of_run(PortTable(replay="no.log"), run, Example(4)):
         pass
 
 
@@ -546,9 +556,9 @@ def test_the_switch_closes_in_time(vehicle):
 
 def test_conversion_to_bits_and_nothing_without_it():
     says = Says(held)
-    sensed(says, 4, Conversion(), Conversion()).sample(of())
+    controller_behind_sensors(says, 4, Conversion(), Conversion()).sample(of())
     assert says.seen[0].wheels.tolist() == [11.0, 10.0, 9.0, 8.0]
-    converted = sensed(says, 4, Conversion(bits=3, range=14.0), Conversion())
+    converted = controller_behind_sensors(says, 4, Conversion(bits=3, range=14.0), Conversion())
     converted.sample(of(wheels=(0.9, 1.1, 99.0, -1.0)))  # codes of 2 m/s: 0, 1, the last, 0
     assert says.seen[1].wheels.tolist() == [0.0, 2.0, 14.0, 0.0]
 
@@ -556,7 +566,7 @@ def test_conversion_to_bits_and_nothing_without_it():
 def test_noise_gain_and_offset_of_signals_and_pressures():
     says = Says(lambda given: Command(pressures=np.full(4, 2.0)))
     own = Conversion(gain=2.0, offset=1.0, noise=0.5, seed=7)
-    one, other = (sensed(says, 4, own, own) for _ in range(2))
+    one, other = (controller_behind_sensors(says, 4, own, own) for _ in range(2))
     back = np.array([one.sample(of(i)).pressures for i in range(2500)])
     seen = np.array([given.wheels for given in says.seen])
     assert np.array_equal(back[2000], other.sample(of(2000)).pressures)  # noise is that of the sample, in any order
@@ -609,7 +619,7 @@ def test_lost_and_delayed_samples_and_stuck_valves():
         Fault(kind="stuck", start=5 * SAMPLE, wheels=[2]),
         Fault(kind="stuck", start=2 * SAMPLE, end=3 * SAMPLE, wheels=[3], state=0),
     ]
-    faulty = Faulty(says, faults)
+    faulty = FaultyController(says, faults)
     valves = np.array([faulty.sample(of(i, (float(i),) * 4)).valves for i in range(8)])
     seen = np.array([given.wheels for given in says.seen])
     assert seen[:, 0].tolist() == [0, 1, 1, 1, 4, 5, 6, 7]
@@ -638,7 +648,10 @@ def test_a_table_that_cannot_be(table, told):
 
 def test_a_fault_of_a_wheel_that_is_not_there():
     table = PortTable(faults=[Fault(kind="lost", wheels=[4])])
-    with pytest.raises(InputError, match="from 0 to 3"), opened(table, ControllerRun(RADIUS, SAMPLE), Example(4)):
+    with (
+        pytest.raises(InputError, match="from 0 to 3"),
+        controller_of_run(table, ControllerRun(RADIUS, SAMPLE), Example(4)),
+    ):
         pass
 
 
@@ -664,9 +677,12 @@ def test_a_controller_that_writes_into_its_question_does_not_change_the_log(tmp_
         given.wheels[:] = 0.0
         return Command(valves=np.ones(4, dtype=np.int64))
 
-    with opened(PortTable(log="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (own, _):
+    with controller_of_run(PortTable(log="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(writes)) as (
+        own,
+        _,
+    ):
         own.sample(of())
-    with opened(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (
+    with controller_of_run(PortTable(replay="a.log"), ControllerRun(RADIUS, SAMPLE, "s", tmp_path), Says(_raises)) as (
         replayed,
         _,
     ):

@@ -5,11 +5,20 @@ import pytest
 
 from models.advice.price import runner as cost
 from models.engines.braking import CarriedChassis
-from models.systems.braking.march import Braked
-from models.tyre.tyre_table import stacked
-from validation.braking.quarter_stops import FRONT
+from models.systems.braking.march import BrakedVehicle
+from models.tyre.tyre_table import stacked_tables
+from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import EULER, FULL_STEPS, LITERAL, OURS, QUICK, RK4, BrakingStop, Played
+from validation.price.problems.braking_stop import (
+    EULER,
+    FULL_STEPS,
+    LITERAL,
+    OWN_METHOD,
+    QUICK,
+    RK4,
+    BrakingStop,
+    ReplayedController,
+)
 
 
 @pytest.fixture(scope="module")
@@ -17,12 +26,12 @@ def short():
     """The quick problem from a low speed, of which it takes half, its reference loose."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(braking_stop, "SPEED", 4.0)
-        patch.setattr(braking_stop, "CHANGE", 1.2)
+        patch.setattr(braking_stop, "SURFACE_CHANGE", 1.2)
         patch.setattr(braking_stop, "SOLVERS", {True: (("DOP853", 1e-8), ("LSODA", 1e-8))})
         yield BrakingStop(True)
 
 
-@pytest.mark.parametrize(("method", "bound"), [(OURS, 1e-6), (RK4, 1e-6), (EULER, 1e-4), (LITERAL, 1e-3)])
+@pytest.mark.parametrize(("method", "bound"), [(OWN_METHOD, 1e-6), (RK4, 1e-6), (EULER, 1e-4), (LITERAL, 1e-3)])
 def test_every_scheme_comes_to_the_reference(short, method, bound):
     """At 64 steps to a sample, of a distance of 1 m or so."""
     found = cost.attempt(short, short.setting("reference", method, 5.5e-3 / 64))
@@ -39,22 +48,22 @@ def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatc
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(short, engine):
     """What the problem's note says: rounding of some hundred steps of 10 mm, 1e-14 m each."""
-    stop = Braked(
-        FRONT.plane,
+    stop = BrakedVehicle(
+        FRONT_WHEEL.plane,
         np.zeros(1, dtype=np.int64),
-        stacked(short._tables),
+        stacked_tables(short._tables),
         1.0,
         short._road,
         short._brakes,
         short._chambers,
         np.zeros(1),
         substeps=2,
-        engine=CarriedChassis(engine, FRONT.plane),
+        engine=CarriedChassis(engine, FRONT_WHEEL.plane),
     )
-    path = stop.run(Played(short.valves), 2.0)
-    assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._stop_by_twinrig(2).distance, abs=1e-12)
+    path = stop.run(ReplayedController(short.valves), 2.0)
+    assert path.ended_at_rest and path.states[-1, 0, 0] == pytest.approx(short._stop_by_twinrig(2).distance, abs=1e-12)
 
 
 def test_a_step_is_the_longest_that_divides_a_sample(short):
-    assert short.setting("reference", OURS, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
+    assert short.setting("reference", OWN_METHOD, 1.2e-3).value == pytest.approx(5.5e-3 / 5)
     assert all(set(QUICK[method]) <= set(FULL_STEPS[method]) for method in FULL_STEPS)

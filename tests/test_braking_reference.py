@@ -12,8 +12,8 @@ from scipy.special import bernoulli
 from models.brake import plain
 from models.brake.plain.suspension import Suspension
 from models.brake.plain.wheel import Force, WheelStep, along_nodes, wheel_step
-from models.brake.plane_vehicle import truck
-from models.brake.wheel_step import passed
+from models.brake.plane_vehicle import plane_of_truck
+from models.brake.wheel_step import distance_integral
 from models.core.errors import Refused, RunFailed
 from models.systems.braking.plan import check
 from models.systems.braking.run import run as drive
@@ -38,7 +38,7 @@ def test_the_integral_of_a_slip_that_decays_is_exact_on_both_sides_of_its_series
         # z / (1 - exp(-z)) - 1 by Bernoulli's numbers, whose series converges for |z| < 2 pi
         exact = sum(float(b) * decay ** (k - 1) / math.factorial(k) for k, b in enumerate(bernoulli(40)) if k > 1) + 0.5
         way = -math.expm1(-decay) / decay
-        assert passed(way, 1.0, decay, 1.0) == pytest.approx(exact * way, rel=1e-13)
+        assert distance_integral(way, 1.0, decay, 1.0) == pytest.approx(exact * way, rel=1e-13)
 
 
 def test_the_states_of_the_wheel_reach_every_branch():
@@ -73,7 +73,7 @@ def test_a_wheel_keeps_its_momentum_whatever_it_does():
 
 def test_loads_at_rest_are_those_of_levers():
     for own in (box(), car()):
-        assert Suspension(own).loads == pytest.approx(truck(own.plane).static, rel=1e-9)
+        assert Suspension(own).loads == pytest.approx(plane_of_truck(own.plane).static, rel=1e-9)
 
 
 @pytest.mark.grounds("plain counterpart")
@@ -84,7 +84,7 @@ def test_accelerations_are_those_of_the_engine(name, engine):
 
 
 def test_a_piece_of_a_stop_is_that_of_the_engine():
-    own = whole.asymmetric()
+    own = whole.asymmetric_twin()
     assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
 
 
@@ -94,13 +94,13 @@ def test_a_turn_on_relaxing_tyres_tends_to_its_written_equations_by_order_two():
 
 
 def test_a_steady_circle_is_that_of_the_engine():
-    found, plain = whole.turns(whole.asymmetric())
+    found, plain = whole.circles_of_both_sides(whole.asymmetric_twin())
     assert found[0] > 0.05 and np.abs(found - plain).max() < 1e-11
 
 
 def test_a_stop_ends_where_that_of_the_engine_ends():
     stops = [whole.run(box(), engine, 1.0, False, 0.3) for engine in ("mujoco", "reference")]
-    assert all(stop.stands for stop in stops) and whole.paths_apart(*stops) < 1e-11
+    assert all(stop.ended_at_rest for stop in stops) and whole.paths_apart(*stops) < 1e-11
 
 
 def test_what_turns_over_and_what_is_too_stiff_is_told():

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 from models.brake.controller import Pressures
-from models.brake.plane_vehicle import PAPER, truck
-from models.systems.braking.procedures import ready, steered
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
+from models.systems.braking.procedures import steer_angles, vehicle_and_start
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
-from models.tyre.tyre_source import named
+from models.tyre.tyre_source import named_tyre
 
 pytestmark = pytest.mark.grounds("closed form")
 ENGINES = ("reference", "exudyn", "mujoco")
-PLANE = truck(PAPER)
+PLANE = plane_of_truck(PAPER_TRUCK)
 LOCKING = {"front": {"gradient": 1500.0}, "rear": {"gradient": 1500.0}, "supply": 9.0}
 """Brakes that lock every wheel on ice and on snow."""
 
@@ -26,7 +26,7 @@ def scene(speed, duration, **tables):
 
 def locked_friction(surface):
     """Of a locked wheel of the truck, by wheel."""
-    return np.array([named(surface).figures(float(load))["locked"] for load in PLANE.static])
+    return np.array([named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -40,7 +40,7 @@ def test_wheels_that_roll_slow_the_truck_by_the_torques_of_their_brakes(engine):
     torque = np.array([1875.0, 1875.0, 1200.0, 1200.0])
     assert result["torque"][-1] == pytest.approx(torque, rel=1e-12)
     assert result["pressure"][-1] == pytest.approx([1.5] * 4, rel=1e-12)
-    wanted = (torque / PLANE.radius).sum() / (PAPER.mass + (PLANE.spin / PLANE.radius**2).sum())
+    wanted = (torque / PLANE.radius).sum() / (PAPER_TRUCK.mass + (PLANE.spin / PLANE.radius**2).sum())
     speeds, times = result["rates"][:, 0], result.times
     assert speeds[0] == pytest.approx(12.3, rel=1e-12)
     assert result["turning"][0] == pytest.approx(12.3 / PLANE.radius, rel=1e-12)
@@ -59,7 +59,7 @@ def test_locked_wheels_stop_the_truck_by_their_friction_as_the_scene_scales_it(e
     assert not result["turning"][late].any()
     assert -result["force_x"][late] / result["load"][late] == pytest.approx(np.tile(mu, (len(result.times[late]), 1)))
     assert result["load"][late] == pytest.approx(np.tile(PLANE.static, (len(result.times[late]), 1)), rel=1e-9)
-    slowing = (mu * PLANE.static).sum() / PAPER.mass
+    slowing = (mu * PLANE.static).sum() / PAPER_TRUCK.mass
     assert -np.diff(result["rates"][late, 0]) / np.diff(result.times[late]) == pytest.approx(slowing, rel=1e-6)
     assert result.data.attrs["stands"] == 1 and result["rates"][-1, 0] == pytest.approx(0.0, abs=1e-9)
 
@@ -82,7 +82,7 @@ def test_chambers_fill_with_their_time_constant():
 
 
 def test_wheels_have_the_pressures_that_they_are_told():
-    vehicle, start = ready(scene(10.5, 1.0, brakes=LOCKING), "stop")
+    vehicle, start = vehicle_and_start(scene(10.5, 1.0, brakes=LOCKING), "stop")
     asked = np.array([1.3, 1.7, 0.4, 2.1])
     path = vehicle.run(Pressures(asked), start, 0.05)
     assert path.pressures[-1] == pytest.approx(asked, rel=1e-12)
@@ -91,10 +91,10 @@ def test_wheels_have_the_pressures_that_they_are_told():
 
 def test_only_front_wheels_are_steered_by_the_knots_of_the_procedure():
     knots = [[0.5, 0.01], [1.5, 0.05]]
-    vehicle, start = ready(scene(10.5, 1.0, procedure={"kind": "j_turn", "steering": knots}), "stop")
+    vehicle, start = vehicle_and_start(scene(10.5, 1.0, procedure={"kind": "j_turn", "steering": knots}), "stop")
     for time, angle in ((0.0, 0.01), (1.0, 0.03), (4.0, 0.05)):
         assert vehicle.steering(time) == pytest.approx([angle, angle, 0.0, 0.0], rel=1e-12)
-    fixed, _ = ready(scene(10.5, 1.0, procedure={"kind": "j_turn", "steer": -0.02}), "stop")
+    fixed, _ = vehicle_and_start(scene(10.5, 1.0, procedure={"kind": "j_turn", "steer": -0.02}), "stop")
     assert fixed.steer == pytest.approx([-0.02, -0.02, 0.0, 0.0], rel=1e-12)
-    assert steered(vehicle, 0.3) == pytest.approx([0.3, 0.3, 0.0, 0.0], rel=1e-12)
+    assert steer_angles(vehicle, 0.3) == pytest.approx([0.3, 0.3, 0.0, 0.0], rel=1e-12)
     assert start.state[1, 0] == 10.5 and start.turning == pytest.approx(10.5 / PLANE.radius, rel=1e-12)

@@ -13,13 +13,13 @@ from models.brake.port.ask import ControllerFailed
 from models.core.errors import InputError
 from models.core.systems import load
 from models.systems.braking.adhesion import Adhesion, NoAdhesion, utilisation
-from models.systems.braking.of_scene import braked
+from models.systems.braking.of_scene import braked_vehicle
 from models.systems.braking.plan import check, check_reference, describe
-from models.systems.braking.procedures import ready
+from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
-from studies.braking import lines
+from studies.braking import figures_lines
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 PLAIN = {"title": "t", "system": "braking", "run": {"duration": 0.3}, "procedures": {"stop": {"speed": 10.0}}}
@@ -80,15 +80,15 @@ def test_a_plan_names_what_is_absent_and_what_is_there():
 
 
 def test_without_load_transfer_and_dynamics_nothing_of_them_is_computed():
-    bare, full = braked(scene(), scene().procedures["stop"]), load(SCENES / "braking.toml")
-    assert not bare.plane.by_x.any() and not bare.plane.by_y.any() and not bare.chambers.fill.any()
-    assert braked(full, full.procedures["straight"]).plane.by_x.all()
+    bare, full = braked_vehicle(scene(), scene().procedures["stop"]), load(SCENES / "braking.toml")
+    assert not bare.plane.by_x.any() and not bare.plane.by_y.any() and not bare.chambers.fill_time.any()
+    assert braked_vehicle(full, full.procedures["straight"]).plane.by_x.all()
 
 
 @pytest.mark.parametrize("radius", [137.0, -137.0])
 def test_a_turn_begins_on_its_steady_circle(radius):
     own = scene(procedures={"a": {"kind": "turn", "speed": 8.0, "radius": radius}}, load_transfer={})
-    vehicle, start = ready(own, "a")
+    vehicle, start = vehicle_and_start(own, "a")
     path = replace(vehicle, switch=1.0).run(Applied(), start, 0.5)
     centre = radius * np.array([-start.state[1, 1], start.state[1, 0]]) / 8.0
     off = np.hypot(*(path.states[:, 0, :2] - centre).T) - abs(radius)
@@ -114,7 +114,7 @@ class Applied:
 
 
 def test_a_controller_that_dies_leaves_the_path_until_then():
-    vehicle, start = ready(scene(), "stop")
+    vehicle, start = vehicle_and_start(scene(), "stop")
     with pytest.raises(ControllerFailed, match="dead") as error:
         vehicle.run(Applied(5), start)
     assert len(error.value.partial.times) == 6 and error.value.partial.reports.load.shape[0] == 5
@@ -147,8 +147,8 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
 def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
     lags = {"relaxation": {"front": 0.005, "rear": 0.5}, "road": {"stretches": [{"left": "dry"}]}}
     with pytest.raises(InputError, match=r"run\.substeps = 1: must be at least 2: .* rocks up"):
-        ready(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
-    ready(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
+        vehicle_and_start(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
+    vehicle_and_start(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
@@ -259,4 +259,4 @@ def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
 
 def test_a_run_that_ends_before_the_vehicle_stands_says_so():
     stop = Stop(drive(scene()).detail)
-    assert "not stopped by 0.3025 s, still 9.7" in lines("stop", stop, {}, {})[0]
+    assert "not stopped by 0.3025 s, still 9.7" in figures_lines("stop", stop, {}, {})[0]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lti, step
 
-from models.brake.plane_vehicle import GRAVITY, PAPER
-from models.brake.steering import Steering, response
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK
+from models.brake.steering import Steering, yaw_response
 from models.core.errors import InputError
-from models.systems.braking.procedures import ready, step_steer
+from models.systems.braking.procedures import step_steer, vehicle_and_start
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 
 STEPS = np.linspace(0.0, 8.0, 80_001)
 
@@ -30,15 +30,17 @@ def scene(**procedure):
 
 
 def test_response_of_first_and_second_order():
-    lag = response(STEPS, -0.2 * (1.0 - np.exp(-STEPS / 0.5)), 0.1)
+    lag = yaw_response(STEPS, -0.2 * (1.0 - np.exp(-STEPS / 0.5)), 0.1)
     assert lag.time == pytest.approx(0.5 * np.log(10.0) - 0.1, abs=1e-4) and lag.overshoot < 1e-6
     damping, rate = 0.4, 4.0
     _, rises = step(lti([rate**2], [1.0, 2.0 * damping * rate, rate**2]), T=STEPS)
-    assert response(STEPS, rises, 0.0).overshoot == pytest.approx(np.exp(-np.pi * 0.4 / np.sqrt(1 - 0.16)), abs=1e-4)
+    assert yaw_response(STEPS, rises, 0.0).overshoot == pytest.approx(
+        np.exp(-np.pi * 0.4 / np.sqrt(1 - 0.16)), abs=1e-4
+    )
 
 
 def test_a_yaw_rate_that_does_not_settle_has_no_response():
-    assert response(STEPS, STEPS, 0.0) is None and response(STEPS, 0.0 * STEPS, 0.0) is None
+    assert yaw_response(STEPS, STEPS, 0.0) is None and yaw_response(STEPS, 0.0 * STEPS, 0.0) is None
 
 
 def test_half_of_the_steering():
@@ -51,10 +53,13 @@ def test_half_of_the_steering():
 def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
     speed, angle, ramp = 10.0, 2e-4, 0.1
     found = step_steer(scene(steering=[[0.0, 0.0], [ramp, angle]], speed=speed), "j")
-    a, b, mass = PAPER.front.x, -PAPER.rear.x, PAPER.mass
-    rolling = sum(2.0 * axle.spin_inertia * (axle.track / 2.0 / axle.radius) ** 2 for axle in (PAPER.front, PAPER.rear))
-    inertia = PAPER.yaw_inertia + rolling  # wheels that roll turn faster outside, slower inside
-    each = surface("dry").cornering * mass * GRAVITY
+    a, b, mass = PAPER_TRUCK.front.x, -PAPER_TRUCK.rear.x, PAPER_TRUCK.mass
+    rolling = sum(
+        2.0 * axle.spin_inertia * (axle.track / 2.0 / axle.radius) ** 2
+        for axle in (PAPER_TRUCK.front, PAPER_TRUCK.rear)
+    )
+    inertia = PAPER_TRUCK.yaw_inertia + rolling  # wheels that roll turn faster outside, slower inside
+    each = table_of_surface("dry").cornering * mass * GRAVITY
     front, rear = each * b / (a + b), each * a / (a + b)
     turned, damped = a * front - b * rear, a * a * front + b * b * rear
     system = np.array(
@@ -65,9 +70,9 @@ def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
     )
     given = lti(system, np.array([[front / mass], [a * front / inertia]]), np.array([[0.0, 1.0]]), 0.0)
     _, rates, _ = given.output(np.interp(STEPS, [0.0, ramp], [0.0, angle]), STEPS)
-    wanted = response(STEPS, rates, ramp / 2.0)
+    wanted = yaw_response(STEPS, rates, ramp / 2.0)
     assert found.time == pytest.approx(wanted.time, abs=1e-4)  # by linear crossing within samples of 5.5 ms
-    assert found.steady == pytest.approx(wanted.steady, rel=1e-6)
+    assert found.steady_rate == pytest.approx(wanted.steady_rate, rel=1e-6)
 
 
 def test_a_ramp_turns_less_than_a_step_and_a_step_of_one_knot_the_same():
@@ -77,7 +82,7 @@ def test_a_ramp_turns_less_than_a_step_and_a_step_of_one_knot_the_same():
 
 
 def test_a_ramp_begins_with_straight_wheels():
-    assert not ready(scene(steering=[[0.0, 0.0], [0.2, 0.03]]), "j")[0].steer.any()
+    assert not vehicle_and_start(scene(steering=[[0.0, 0.0], [0.2, 0.03]]), "j")[0].steer.any()
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from models.brake.quarter import Quarter, QuarterPath, QuarterStop
 from models.brake.relaxation import by_lagging_steps
 from models.brake.samples import by_steps
 from models.core.errors import InputError
-from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.quarter_stops import LITERAL, exact_distance, stopped
+from models.tyre.tyre_table import TyreTable, stacked_tables
+from validation.braking.quarter_stops import LITERAL, exact_distance, stopping_distance
 from validation.cases import braking_stop as case
 
 
@@ -20,10 +20,10 @@ def test_all_rows_pass(tmp_path):
 
 def test_the_literal_scheme_would_fail():
     tyre, _ = case.friction_table("dry")
-    torque = case.steady_torque(case.FRONT, tyre, 0.06)[1]
+    torque = case.steady_torque(case.FRONT_WHEEL, tyre, 0.06)[1]
     error = (
-        stopped(LITERAL, case.FRONT, tyre, torque, 22.22, case.STEP)[0]
-        / exact_distance(case.FRONT, tyre, torque, 22.22)
+        stopping_distance(LITERAL, case.FRONT_WHEEL, tyre, torque, 22.22, case.PAPER_STEP)[0]
+        / exact_distance(case.FRONT_WHEEL, tyre, torque, 22.22)
         - 1
     )
     assert 0.05 < error < 0.08  # 6.4 %: force of the start of the step on the vehicle
@@ -32,7 +32,7 @@ def test_the_literal_scheme_would_fail():
 def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
     tyre, _ = case.friction_table("ice")
     slide = 11.11**2 / (2.0 * case.GRAVITY * float(tyre.mu_x[0, 0, -1]))
-    assert exact_distance(case.FRONT, tyre, 1e7, 11.11) == pytest.approx(
+    assert exact_distance(case.FRONT_WHEEL, tyre, 1e7, 11.11) == pytest.approx(
         slide, rel=1e-4
     )  # it locks within a millisecond
 
@@ -63,7 +63,12 @@ def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
 def test_a_torque_that_drives_is_refused():
     with pytest.raises(InputError, match="brake opposes"):
         case.braked(
-            case.FRONT, case.friction_table("ice")[1], case.UNIFORM_ROAD, np.array([0.0, -1.0]), case.STEP, 10.0
+            case.FRONT_WHEEL,
+            case.friction_table("ice")[1],
+            case.UNIFORM_ROAD,
+            np.array([0.0, -1.0]),
+            case.PAPER_STEP,
+            10.0,
         )
 
 
@@ -76,8 +81,8 @@ def test_compiled_samples_are_kept_on_disk_for_other_processes():
 def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one():
     """Its slip tends to 1, and by rounding must not go beyond; the stop is then that of a locked wheel."""
     rising = TyreTable([0.0], [0.0, 0.1, 1.0], [1e4], [[[0.0, 0.2, 0.9]]], [[1.0, 1.0, 1.0]], [[0.0]])
-    quarter, tables = Quarter(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked([rising])
+    quarter, tables = Quarter(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked_tables([rising])
     locking = 0.9 * quarter.mass * case.GRAVITY * quarter.radius
     for step in (1e-3, 1.3e-2):
         stop = case.braked(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)
-        assert stop.rest > 0 and stop.distance == pytest.approx(17.3**2 / (2.0 * 0.9 * case.GRAVITY), rel=1e-3)
+        assert stop.step_of_rest > 0 and stop.distance == pytest.approx(17.3**2 / (2.0 * 0.9 * case.GRAVITY), rel=1e-3)

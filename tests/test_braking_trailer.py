@@ -6,27 +6,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.brake.plane_vehicle import truck
-from models.brake.sprung import sprung
+from models.brake.plane_vehicle import plane_of_truck
+from models.brake.sprung import suspended_vehicle
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named_effects, without
+from models.core.scene_effects import named_effects, scene_without
 from models.engines.braking_sprung import driven
 from models.engines.free_vehicle import built_share
 from models.multibody.forces import PARTS
-from models.systems.braking.march import Start
+from models.systems.braking.march import StartState
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.plan import check, describe
-from models.systems.braking.procedures import ready
+from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop, wheel_names
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import hitch_of
 from models.vehicles.vehicle_file import SHIPPED
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as closed
-from validation.braking.sprung_box import braked, car, stays, steady_torques
-from validation.spatial.towing import keep_to_the_car, levers
+from validation.braking.sprung_box import braked_vehicle, car, remaining_speed, steady_torques
+from validation.spatial.towing import keep_to_the_car, loads_and_lengths
 from validation.spatial.trains import caravan, train
 
 
@@ -52,8 +52,8 @@ def scene(**tables: Any) -> Any:
 
 
 def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
-    train_of_two = whole.towing()
-    front, rear, axle, _ = levers(train_of_two.handling)
+    train_of_two = whole.towing_car()
+    front, rear, axle, _ = loads_and_lengths(train_of_two.handling)
     assert train_of_two.in_plane().static.reshape(3, 2).sum(axis=1) == pytest.approx([front, rear, axle], rel=1e-9)
     way, wanted = closed.locked_stop()
     assert way == pytest.approx(wanted, rel=1e-3)  # the car leans ahead by less than a millimetre
@@ -61,9 +61,9 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
 
 @pytest.mark.grounds("closed form")
 def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hold_on_to_the_car_are_seen():
-    errors = closed.errors()
+    errors = closed.caravan_errors()
     assert max(abs(error) for error in (errors.deceleration, errors.load, errors.pull)) < 1e-3
-    wrong = closed.relative_difference(closed.pulled(closed.hold_on_to_the_car, 2.5), closed.pulled_by_levers())
+    wrong = closed.relative_difference(closed.pulled_caravan(closed.hold_on_to_the_car, 2.5), closed.pulled_by_levers())
     assert abs(wrong.load) > 5e-3
 
 
@@ -95,15 +95,15 @@ def test_springs_of_a_trailer_are_the_engines_own_and_the_table_has_no_more_of_t
 
 
 def test_a_vehicle_that_tows_nothing_has_the_units_and_wheels_of_before():
-    alone, plane = car(), truck(car().plane)
+    alone, plane = car(), plane_of_truck(car().plane)
     assert all(np.array_equal(ours, theirs) for ours, theirs in zip(alone.in_plane(), plane, strict=True))
     assert alone.turns.size == 0 and alone.leans.tolist() == [4, 5]
-    assert whole.towing().size == alone.size + 5 and whole.towing().in_plane().wheels == 6
+    assert whole.towing_car().size == alone.size + 5 and whole.towing_car().in_plane().wheels == 6
 
 
 def test_mirrored_steering_gives_a_mirrored_stop_of_a_controlled_train_that_stays():
-    torques, wet = steady_torques(500.0, 500.0, 200.0, 200.0, 300.0, 300.0), surface("wet")
-    left, right = (braked(whole.towing(), wet, steer=steer).run(torques, 4.0) for steer in (0.1, -0.1))
+    torques, wet = steady_torques(500.0, 500.0, 200.0, 200.0, 300.0, 300.0), table_of_surface("wet")
+    left, right = (braked_vehicle(whole.towing_car(), wet, steer=steer).run(torques, 4.0) for steer in (0.1, -0.1))
     names = list(left.coordinates)
     same = [names.index(name) for name in ("carrier x", "sway z", "sway ry", "caravan hitch ry")]
     turned = [names.index(name) for name in ("carrier y", "carrier rz", "sway rx", "caravan hitch rx")]
@@ -111,15 +111,15 @@ def test_mirrored_steering_gives_a_mirrored_stop_of_a_controlled_train_that_stay
     ours, theirs = left.states[-1, 0], right.states[-1, 0]
     assert abs(ours[yaw]) > 1e-3 and ours[same] == pytest.approx(theirs[same], abs=1e-8)
     assert ours[[*turned, yaw]] == pytest.approx(-theirs[[*turned, yaw]], abs=1e-8)
-    assert left.stands and stays(braked(whole.towing(), wet, steer=0.1), left, 0.2) == 0.0
+    assert left.ended_at_rest and remaining_speed(braked_vehicle(whole.towing_car(), wet, steer=0.1), left, 0.2) == 0.0
 
 
 def test_a_train_whose_car_alone_brakes_jackknifes_and_says_so():
-    vehicle = braked(whole.towing(), surface("ice"))
+    vehicle = braked_vehicle(whole.towing_car(), table_of_surface("ice"))
     start = vehicle.rolling(15.0)
-    start.state[0, whole.towing().turns] = 0.3
+    start.state[0, whole.towing_car().turns] = 0.3
     with pytest.raises(RunFailed, match=r"jackknifes: a hitch yaws by more than 1\.57 rad"):
-        vehicle.run(steady_torques(3e3, 3e3, 3e3, 3e3, 0.0, 0.0), Start(*start), 20.0)
+        vehicle.run(steady_torques(3e3, 3e3, 3e3, 3e3, 0.0, 0.0), StartState(*start), 20.0)
 
 
 def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
@@ -137,14 +137,14 @@ def test_a_scene_brakes_and_controls_the_wheels_of_its_trailer():
 
 
 def test_a_steady_circle_tows_the_caravan_inwards():
-    vehicle, start = ready(scene(), "turn")
+    vehicle, start = vehicle_and_start(scene(), "turn")
     path = vehicle.run(steady_torques(*6 * (0.0,)), start, 0.1)
     yaw = vehicle.sprung.turns[0]
     assert start.state[0, yaw] < -0.05 and abs(path.states[-1, 0, yaw] - start.state[0, yaw]) < 1e-5
 
 
 def test_what_is_left_out_is_the_trailer_alone():
-    alone = without(scene(), "towed")
+    alone = scene_without(scene(), "towed")
     assert (
         alone.vehicle.file == "r19_free"
         and "towed" not in named_effects(alone)
@@ -156,16 +156,16 @@ def test_a_train_that_cannot_brake_is_told(tmp_path):
     (tmp_path / "mine.toml").write_text((SHIPPED / "r19_caravan.toml").read_text())
     own = scene(vehicle={"file": str(tmp_path / "mine.toml"), "spin_inertia": 1.7})
     with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):
-        without(own, "towed")
+        scene_without(own, "towed")
     with pytest.raises(InputError, match=r"run\.forces = 'compiled': has no meaning without vehicle\.file"):
         scene(vehicle={}, run={"forces": "compiled"})
     whole_train = caravan()
     three = tuple(tyre for tyre in whole_train.tyres if tyre.name != "cr")
     with pytest.raises(InputError, match=r"tyres = .*: must be two of each of two axles, and of each axle behind them"):
-        sprung(replace(whole_train, tyres=three), 1.7)
+        suspended_vehicle(replace(whole_train, tyres=three), 1.7)
     stiff = tuple(
         replace(body, freedoms=("rx", "ry")) if body.name == hitch_of("caravan") else body
         for body in whole_train.bodies
     )
     with pytest.raises(InputError, match=r"bodies\[caravan\]\.freedoms = \['rx', 'ry'\]: must have rz"):
-        sprung(replace(whole_train, bodies=stiff), 1.7)
+        suspended_vehicle(replace(whole_train, bodies=stiff), 1.7)

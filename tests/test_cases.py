@@ -7,7 +7,7 @@ import pytest
 import slow_machine
 
 from validation.cases import CASES
-from validation.run import seeds
+from validation.run import seeds_of_rows
 
 QUICK = (
     "audit",
@@ -87,4 +87,4 @@ def test_row_ids_are_unique(measured):
 
 
 def test_seeds_are_named():
-    assert all(isinstance(seed, int) for seed in seeds().values())
+    assert all(isinstance(seed, int) for seed in seeds_of_rows().values())

@@ -5,13 +5,13 @@ import json
 import pytest
 
 from models.core.errors import InputError
-from validation.common.changes import KINDS, against, changes, lines, read_results
-from validation.common.rows import Observed, behaves
+from validation.common.changes import CHANGE_KINDS, change_lines, changed_rows, comparison_with_earlier, read_results
+from validation.common.rows import Observed, behaviour_row
 from validation.report.page import write
 
 ERROR = Observed("a.error", "drift", "an error", 1e-6, "m").at_most(1e-5, "why", "native")
 VALUE = Observed("a.value", "drift", "a value", 2.0, "m").within(2.0, 0.5, "why", "native")
-WORD = behaves("a.word", "drift", "a word", "refused", "refused", "why")
+WORD = behaviour_row("a.word", "drift", "a word", "refused", "refused", "why")
 
 
 def table(*rows):
@@ -40,15 +40,17 @@ def changed(row, **keys):
     ],
 )
 def test_every_kind_of_change_is_found_and_rounding_is_none(before, after, kinds):
-    assert [one["kind"] for one in changes(before, after)] == kinds
+    assert [one["kind"] for one in changed_rows(before, after)] == kinds
 
 
 def test_what_fails_now_comes_first():
     before = table(ERROR, VALUE, WORD)
     after = changed(VALUE, value=2.2) | changed(WORD, status="failed", reason="found 'silent'")
-    found = changes(before, after)
+    found = changed_rows(before, after)
     assert [one["id"] for one in found] == ["a.word", "a.error", "a.value"]
-    assert [KINDS.index(one["kind"]) for one in found] == sorted(KINDS.index(one["kind"]) for one in found)
+    assert [CHANGE_KINDS.index(one["kind"]) for one in found] == sorted(
+        CHANGE_KINDS.index(one["kind"]) for one in found
+    )
 
 
 def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
@@ -66,7 +68,7 @@ def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
         )
     )
     rows = [*changed(VALUE, value=2.25).values()]
-    found = against(
+    found = comparison_with_earlier(
         read_results(tmp_path / "old.json"),
         rows,
         {"quick": False, "versions": {"numpy": "2", "scipy": "1"}, "python": "3.12"},
@@ -74,7 +76,7 @@ def test_the_report_tells_changes_and_is_drawn_again_from_its_results(tmp_path):
     assert found["note"] == (
         "the earlier report is the quick one and this the full one; version of numpy 1 -> 2; python 3.11 -> 3.12"
     )
-    assert "2 changes: 0 of status, 1 gone, 0 new, 0 judged otherwise, 1 of value" in lines(found)[0]
+    assert "2 changes: 0 of status, 1 gone, 0 new, 0 judged otherwise, 1 of value" in change_lines(found)[0]
     (tmp_path / "results.json").write_text(json.dumps({"provenance": {}, "rows": rows, "against": found}))
     first = write(tmp_path).read_bytes()
     assert b"What changed" in first and b"a.word" in first and write(tmp_path).read_bytes() == first

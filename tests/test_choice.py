@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 
 from models.advice.choice import choose
-from models.advice.choice.answer import Quantity, RunQuantities, added, less, relative, rounding, sizes
+from models.advice.choice.answer import (
+    Quantity,
+    RunQuantities,
+    difference_of_runs,
+    largest_relative_change,
+    rounding_floor,
+    scale_of_cases,
+    sum_of_differences,
+)
 from models.advice.choice.choose import Chooser
 from models.advice.choice.screen import Screen
 from models.advice.choice.variants import Variants
 from models.advice.price.effects import price_list
-from models.advice.price.effects_text import as_dict, lines
+from models.advice.price.effects_text import as_dict, price_list_lines
 from models.core.errors import InputError
 from studies import choice as study
 from studies.command.asked import KNOWN_SYSTEMS, checked_study
@@ -38,24 +46,33 @@ def half_car(**more):
 
 def test_paths_are_compared_where_both_have_a_row_and_by_their_deviation():
     full, half = np.array([0.0, 2.0, 4.0, 6.0, 8.0]), np.array([0.0, 4.0, 9.0])
-    change = less((half,), (full,))
+    change = difference_of_runs((half,), (full,))
     assert change[0].tolist() == [0.0, 0.0, 1.0]
-    assert relative(change, sizes((full,))) == pytest.approx(np.sqrt(1.0 / 3.0) / np.sqrt(8.0))  # its deviation
-    assert added(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
+    assert largest_relative_change(change, scale_of_cases((full,))) == pytest.approx(
+        np.sqrt(1.0 / 3.0) / np.sqrt(8.0)
+    )  # its deviation
+    assert sum_of_differences(change, (np.ones(5),))[0].tolist() == [1.0, 1.0, 2.0]
     with pytest.raises(InputError):
-        less((np.zeros(4),), (full,))
+        difference_of_runs((np.zeros(4),), (full,))
 
 
 def test_a_case_that_does_not_move_is_held_to_a_share_of_the_others():
-    assert sizes((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
+    assert scale_of_cases((np.array([0.0]), np.array([-5.0]))).tolist() == [0.005, 5.0]
 
 
 class Made(Variants):
     """Variants whose quantity is a given function of what is left out and of the step."""
 
     def __init__(self, function, effects):
-        self.function, self.names, self.calls, self._kept, self._costs, self._broken = function, effects, 0, {}, {}, {}
-        self._ready = {}
+        self.function, self.names, self.calls, self._kept, self._work_of_set, self._assumptions_broken = (
+            function,
+            effects,
+            0,
+            {},
+            {},
+            {},
+        )
+        self._computed_in_advance = {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
         self.system = type(
             "System",
@@ -86,16 +103,18 @@ def test_the_second_order_is_exact_for_a_quadratic_and_tells_what_it_leaves_out(
         return 100.0 + x + 0.1 * x**2
 
     screen = Screen(Made(quantity, ("a", "b", "c")), ["q"])
-    assert screen.predicted(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
-    assert screen.remainder(frozenset("ab"))[0] == 0.0  # run itself
+    assert screen.predicted_change(frozenset("abc"))[0] == pytest.approx((6.0 + 3.6) / 100.0)
+    assert screen.higher_order_estimate(frozenset("ab"))[0] == 0.0  # run itself
     second, first = 0.2 * (2.0 + 3.0 + 6.0), 6.0 + 0.1 * 14.0
-    assert screen.remainder(frozenset("abc"))[0] == pytest.approx(second**2 / first / 100.0)
+    assert screen.higher_order_estimate(frozenset("abc"))[0] == pytest.approx(second**2 / first / 100.0)
 
 
 def test_a_pair_is_found_of_which_one_alone_ruins(monkeypatch):
     ruined = {frozenset("a"): 300.0, frozenset("ab"): 101.0, frozenset("b"): 104.5, frozenset(): 100.0}
     choice = chooser(monkeypatch, lambda left_out, times: ruined[left_out], ("a", "b")).choose()
-    assert choice.left_out == ("a", "b") and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.01)
+    assert (
+        choice.left_out == ("a", "b") and choice.within_tolerance and choice.confirmed_change[0] == pytest.approx(0.01)
+    )
 
 
 def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
@@ -109,9 +128,9 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
     found.progress = shares.append
     choice = found.choose()
     own = found.whole.variants.of().counts["calls"]
-    assert choice.ended and choice.left_out == ("e00",) and choice.within_tolerance
-    assert choose.RUNS * own < choice.spent < (choose.RUNS + 10) * own and max(shares) == 1.0
-    assert not chooser(monkeypatch, quantity, names[:5]).choose().ended
+    assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
+    assert choose.RUN_BUDGET * own < choice.calls_of_search < (choose.RUN_BUDGET + 10) * own and max(shares) == 1.0
+    assert not chooser(monkeypatch, quantity, names[:5]).choose().ended_early
 
 
 def test_what_steps_change_is_told_by_shorter_ones_that_have_the_same_times(monkeypatch):
@@ -136,7 +155,7 @@ def test_what_the_confirmation_breaks_is_taken_back(monkeypatch):
     own.whole.variants._kept.clear()
     monkeypatch.setattr(own.whole.variants, "_run", lambda left_out, times: Made._run(own.whole.variants, left_out, 1))
     choice = own.choose()
-    assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed[0] == pytest.approx(0.005)
+    assert choice.left_out == ("a",) and choice.within_tolerance and choice.confirmed_change[0] == pytest.approx(0.005)
 
 
 def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
@@ -148,7 +167,10 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
     own.system.WINDOWED = True
     monkeypatch.setattr(choose, "Variants", lambda scene, engine, executor: own)
     found = Chooser(None, "", ["q"], 0.05)
-    assert found._longest(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4 and found.step_factor == 2
+    assert (
+        found._longest_allowed(Screen(part, ["q"]), frozenset(), part.lengths(), 0.05)[0] == 4
+        and found.step_factor == 2
+    )
 
 
 def hub_forces(**more):
@@ -188,14 +210,18 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert sizes(answer.of("a").cases)[0] < rounding(answer, "N") == pytest.approx(5e-6)
-    assert rounding(answer, "m") == 1e-15
+    assert scale_of_cases(answer.of("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert rounding_floor(answer, "m") == 1e-15
 
 
 def test_drawn_half_cars_keep_their_tolerance_by_runs_of_their_own():
     asked = draw_scene("pitch-plane", 3)
     choice = Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose()
-    assert choice.within_tolerance and (choice.confirmed <= asked.tolerance).all() and choice.calls[2] < choice.calls[0]
+    assert (
+        choice.within_tolerance
+        and (choice.confirmed_change <= asked.tolerance).all()
+        and choice.calls[2] < choice.calls[0]
+    )
 
 
 def test_a_spring_that_hardly_pulls_goes_and_the_road_stays():
@@ -245,9 +271,12 @@ def test_seconds_have_no_say_in_what_is_chosen(monkeypatch):
     for clock in (time.process_time, lambda: float(draw.exponential(1e3))):
         monkeypatch.setattr("time.process_time", clock)
         found.append(Chooser(asked.scene(), "reference", list(asked.quantities), asked.tolerance).choose())
-    one, two = (replace(choice, seconds=(), predicted=0, remainder=0, confirmed=0, chance=0) for choice in found)
+    one, two = (
+        replace(choice, seconds=(), predicted_change=0, prediction_remainder=0, confirmed_change=0, statistical_error=0)
+        for choice in found
+    )
     assert one == two and found[0].seconds != found[1].seconds
-    assert np.array_equal(found[0].confirmed, found[1].confirmed)
+    assert np.array_equal(found[0].confirmed_change, found[1].confirmed_change)
 
 
 def test_work_is_calls_times_what_each_goes_through():
@@ -271,5 +300,5 @@ def test_prices_name_costs_and_changes_and_why_there_is_none():
     assert "gyro" in prices["gyro"].gone and prices["gyro"].changes[0].relative == 0.0
     assert prices["road"].changes[0].relative > 0.1 > max(c.relative for c in prices["pitch_spring"].changes)
     assert "wheel_forces" in prices["contact_points"].why and not prices["contact_points"].counts[0]
-    text = "\n".join(lines(found, ["pitch"]))
+    text = "\n".join(price_list_lines(found, ["pitch"]))
     assert "road" in text and "no price" in text and json.dumps(as_dict(found))

@@ -16,7 +16,7 @@ import pytest
 
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import Crew, cluster
+from models.ensemble.workers import Crew, dask_workers
 
 ROOT = Path(__file__).parents[1]
 TLS = """distributed:
@@ -185,9 +185,9 @@ def test_a_killed_scheduler_is_said_and_the_blocks_are_resumed(secure, tmp_path)
         if state.done >= 9:
             scheduler.send_signal(signal.SIGKILL)
 
-    with pytest.raises(RunFailed, match=r"cluster is gone.*finished blocks are kept"), cluster(address) as pool:
+    with pytest.raises(RunFailed, match=r"cluster is gone.*finished blocks are kept"), dask_workers(address) as pool:
         run_paths(job, 60, kept, pool, Blocks(3), kill)
     assert 3 <= len(list(kept.glob("block*.npz"))) < 20
     assert np.array_equal(run_paths(job, 60, kept, blocks=Blocks(3))["x"], np.sqrt(np.arange(60)))
-    with pytest.raises(InputError, match="no Dask scheduler answers"), cluster(address):
+    with pytest.raises(InputError, match="no Dask scheduler answers"), dask_workers(address):
         pass

@@ -202,8 +202,8 @@ def test_planted_faults_are_seen(fault):
 
 
 def test_a_wrong_factor_in_a_piece_is_seen(monkeypatch):
-    times = module._times
-    monkeypatch.setattr(module, "_times", lambda way, slope: times(way, 1.01 * slope))
+    times = module._crossing_times
+    monkeypatch.setattr(module, "_crossing_times", lambda way, slope: times(way, 1.01 * slope))
     with pytest.raises(AssertionError):
         test_two_slopes(5.0)
 
@@ -224,7 +224,7 @@ def test_scene_with_a_table(tmp_path):
     assert got["centre"][0] == pytest.approx(-1e-3, abs=1e-12)
     assert got["wavelength"][0] == pytest.approx(2.0 * math.pi * math.sqrt(0.46 * 0.75 / 0.05), rel=1e-9)
     assert math.isnan(got["equivalent"][1])
-    assert "half of peak to peak" in "".join(system.lines(got.detail))
+    assert "half of peak to peak" in "".join(system.conicity_lines(got.detail))
     study.run(asked, ("reference",), tmp_path, lambda *_: None)
     again = read_rolling_radii(tmp_path / "rolling_radii.csv")
     np.testing.assert_array_equal(again.differences, got.detail.table.differences)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.ensemble.workers import processes
+from models.ensemble.workers import process_pool
 from validation.common.peak_memory import peak_memory
 from validation.price.contact_stream import answered, in_fresh_process
 
@@ -26,7 +26,7 @@ def test_all_rows_are_answered(tmp_path):
 def test_the_memory_of_a_process_does_not_count_that_of_its_parent():
     """300 MB are held here while the other process starts."""
     large = np.ones(300_000_000 // 8)
-    with processes(1) as executor:
+    with process_pool(1) as executor:
         assert executor.submit(peak_memory).result() < large.nbytes < peak_memory()
 
 

@@ -15,16 +15,16 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import fastsim_fields
 from models.contact.material import MaterialPair
 from models.core.errors import InputError
-from models.core.tables import NEWTONS, SHARES, blocks, read_table
+from models.core.tables import NEWTONS, SHARES, read_table, table_blocks
 from models.ensemble.store import Store
 from models.systems.contact import cases_table
-from models.systems.contact.cases_table import BY_AXES, HEADER, answer_table
-from models.systems.contact.run import Built, contact
+from models.systems.contact.cases_table import ANSWER_HEADINGS, BY_AXES, answer_table
+from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.scene import Method, build
-from models.systems.contact.work_precision import TheoryPoint, cheapest, with_exact_forces
+from models.systems.contact.work_precision import TheoryPoint, fastest_point, with_exact_forces
 from studies.contact_table import summary_lines
 from validation.cases import contact_price
-from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read_contacts, read_drawn
+from validation.contact.contact_set import FRICTION, JUDGED_PART, LOAD, read_contacts, read_drawn
 from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"
@@ -101,7 +101,7 @@ def test_profiles_touch_and_carry_the_load(twinrig):
 
 
 def test_the_stated_error_of_the_cells_is_of_the_size_of_the_true_one():
-    body = contact(build(TABLE))
+    body = solved_contact(build(TABLE))
     motion = (1e-3, -2e-4, 0.4)
     found, error = rolled(body, motion, 21)
     true = np.linalg.norm(found.force - body.roll(motion, 201).force)
@@ -113,7 +113,10 @@ def test_the_stated_error_of_the_cells_is_of_the_size_of_the_true_one():
 def test_the_stated_error_of_the_moment_holds_on_an_ellipse_outside_of_the_set():
     """a/b = 0.3 under spin, where the moment of FASTSIM is off by some 1.4 % of mu N max(a, b)."""
     table = {**TABLE, "ellipse": {"a": 3e-3, "b": 1e-2}, "method": {"cells": 41}}
-    fast, true = contact(build(table)), contact(build({**table, "method": {"name": "exact", "cells": 24}}))
+    fast, true = (
+        solved_contact(build(table)),
+        solved_contact(build({**table, "method": {"name": "exact", "cells": 24}})),
+    )
     found, error = rolled(fast, (0.0, 1e-3, 1.5), 41)
     off, limit = abs(found.mz - true.roll((0.0, 1e-3, 1.5), 24).mz), 0.3 * 8e4 * fast.lever
     assert 0.01 * limit < off < error.moment < 0.1 * limit
@@ -169,7 +172,7 @@ def test_the_linear_theory_is_flagged_on_the_work_precision_page():
 
 
 def test_the_linear_theory_states_how_far_it_is_beyond_friction():
-    body = contact(build({**TABLE, "method": {"name": "linear"}}))
+    body = solved_contact(build({**TABLE, "method": {"name": "linear"}}))
     found, error = rolled(body, (1e-2, 0.0, 2.0), 21)
     assert error.total >= abs(found.fx) - 0.3 * 8e4  # no force is beyond mu N
     assert error.moment >= abs(found.mz) - 0.3 * 8e4 * 5e-3  # nor a moment beyond mu N times the longer semi-axis
@@ -189,10 +192,10 @@ def test_fields_of_fastsim_are_those_of_its_forces():
 def test_a_row_of_a_table_is_the_contact_with_its_units():
     counts, rows = answered(CASES + ROW)
     one = fastsim(RollingEllipse(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4), MaterialPair())
-    assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == HEADER and rows[0]["status"] == "ok"
+    assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == ANSWER_HEADINGS and rows[0]["status"] == "ok"
     for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
         assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)
-    body = contact(build(TABLE))
+    body = solved_contact(build(TABLE))
     error = rolled(body, (1e-3, -2e-4, 0.4), 21)[1]
     assert float(rows[0]["error_of_cells [N]"]) == pytest.approx(error.cells, rel=1e-3)
     assert float(rows[0]["error_of_theory [N]"]) == pytest.approx(error.theory, rel=1e-3)
@@ -225,15 +228,15 @@ def test_wrong_rows_get_a_status_and_stop_no_other():
 
 def test_sizes_of_an_answer_are_those_of_its_sound_rows(monkeypatch):
     """They are what a sweep of a table draws."""
-    monkeypatch.setattr(cases_table, "BLOCK", 2)
+    monkeypatch.setattr(cases_table, "ROWS_PER_BLOCK", 2)
     rows = ["3,3,1,ok", "4,,,wrong", "5,,,wrong", "6,,,wrong", "7,-4,1,ok"]
     Path("forces.csv").write_text("\n".join(["line [-],fx [N],stick [-],status", *rows]) + "\n")
-    assert cases_table.sizes(Path("forces.csv")) == {
+    assert cases_table.column_sizes(Path("forces.csv")) == {
         "fx": {"unit": "N", "largest": 4.0, "rms": pytest.approx(12.5**0.5)},
         "stick": {"unit": "-", "largest": 1.0, "rms": 1.0},
     }
     Path("none.csv").write_text("line [-],fx [N],status\n3,,wrong\n")
-    assert cases_table.sizes(Path("none.csv")) == {}
+    assert cases_table.column_sizes(Path("none.csv")) == {}
 
 
 def test_a_table_that_was_cut_off_says_so():
@@ -261,7 +264,7 @@ def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(head
 
 
 def test_curvatures_give_what_axes_do():
-    body = contact(build(TABLE)).hertz
+    body = solved_contact(build(TABLE)).hertz
     header = "load [N],A [1/m],B [1/m],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
     by_curvatures = answered(f"{header}80000,{float(body.A)!r},{float(body.B)!r},0.3,1e-3,-2e-4,.4\n")[1][0]
     assert float(by_curvatures["fx [N]"]) == pytest.approx(float(answered(CASES + ROW)[1][0]["fx [N]"]), rel=1e-9)
@@ -269,8 +272,12 @@ def test_curvatures_give_what_axes_do():
 
 def test_blocks_join_to_the_whole_table():
     Path("cases.csv").write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n")
-    parts = list(blocks(Path("cases.csv"), (BY_AXES,), 3))
-    assert [len(part.lines) for part in parts] == [3, 3, 2] and [list(part.wrong) for part in parts] == [[], [], [1]]
+    parts = list(table_blocks(Path("cases.csv"), (BY_AXES,), 3))
+    assert [len(part.lines) for part in parts] == [3, 3, 2] and [list(part.faulty_rows) for part in parts] == [
+        [],
+        [],
+        [1],
+    ]
     joined = np.concatenate([part.values["a"] for part in parts])
     assert joined[:7] == pytest.approx(1e-3 * np.arange(1, 8)) and np.isnan(joined[7])
 
@@ -301,13 +308,14 @@ def test_the_cheapest_is_the_fastest_that_meets_the_target():
         TheoryPoint("rough", 9, (0.2,), 0.01, (0.01, 0.02)),
     ]
     assert [
-        getattr(cheapest(points, target, lambda one: one.mean), "name", None) for target in (0.5, 0.05, 0.005, 0.0001)
+        getattr(fastest_point(points, target, lambda one: one.mean), "name", None)
+        for target in (0.5, 0.05, 0.005, 0.0001)
     ] == ["rough", "fast", "slow", None]
 
 
 def test_kept_forces_are_what_the_exact_theory_gives_and_the_set_is_complete():
     """Against the second grid, its own error taken out: 1 % of mu N."""
-    cases, unseen = read_contacts(), read_drawn(JUDGED)
+    cases, unseen = read_contacts(), read_drawn(JUDGED_PART)
     assert len(cases) == 520 and max(case.error for case in cases) < 0.005
     assert len(unseen) == 300 and max(case.error for case in unseen) < 0.006
     case = next(one for one in cases if one.kind == "y" and one.level == 0.5 and one.a == one.b)
@@ -337,7 +345,7 @@ class Counting:
 
 def test_a_long_table_has_the_same_bytes_by_workers_interrupted_and_resumed(monkeypatch, tmp_path):
     """Blocks of 2 rows, one of them with a wrong row; what was finished before the interrupt is not computed again."""
-    monkeypatch.setattr(cases_table, "blocks", partial(blocks, rows=2))
+    monkeypatch.setattr(cases_table, "table_blocks", partial(table_blocks, rows=2))
     path, built = tmp_path / "cases.csv", partial(Built, MaterialPair())
     path.write_text(CASES + "".join(f"{i}{ROW[1:]}" for i in range(1, 8)) + "1,2\n" + ROW)
     alone, shared, resumed = (tmp_path / name for name in ("alone.csv", "shared.csv", "resumed.csv"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.ride.copies_kernel import TOGETHER, Curves, Laws, PushingTyres, march
+from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, Curves, Laws, PushingTyres, march
 
 pytestmark = pytest.mark.grounds("plain counterpart")
 N, WHEELS, SPRINGS, OUTPUTS, STEPS, STEP = 3, 2, 2, 2, 12, 2e-3
@@ -75,7 +75,7 @@ def marched(x, roads, of, first, every):
 def test_states_and_sums_of_powers_are_those_of_whole_arrays():
     """More copies than are stepped side by side; some tyres in the air, travels on both sides of every corner."""
     random = np.random.default_rng(9)
-    of, copies = laws(random), TOGETHER + 5
+    of, copies = laws(random), COPIES_SIDE_BY_SIDE + 5
     start = random.normal(0.0, 0.5, (2 * N, copies))
     roads = random.normal(0.0, 0.3, (2 * STEPS + 1, 2 * WHEELS, copies))
     states, sums = start.copy(), np.zeros((4, OUTPUTS, copies))

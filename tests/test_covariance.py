@@ -7,18 +7,18 @@ import pytest
 
 from models.core.errors import InputError
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
-from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
-from models.ride.excited import DelayedSystem, excited
-from models.ride.frequency import quadrature, spectra
+from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
+from models.ride.excited import DelayedSystem, vehicle_with_road
+from models.ride.frequency import spectral_densities, variances_by_quadrature
 from models.ride.marginal import Unstable, split_marginal
-from models.ride.sweep import ASKED_FOR, sweep
-from models.ride.weighting import WEIGHTINGS, weighted
+from models.ride.sweep import ASKED_FOR, variance_sweep
+from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
-from models.road.two_track import CASES, excitation, road_of_level
+from models.road.two_track import CORRELATION_CASES, road_excitation, road_of_level
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.rides import corners
+from validation.ride.rides import quarter_car_vehicle
 
 CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 Q = 1e-4
@@ -41,7 +41,7 @@ def system(A, B, delays=(0.0,), C=None, D=None, independent=False):
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("corner", [0.0, 1e-6, 1e-3, 0.3, 3.0])
 def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
-    found = stationary(excited(corners([(0.0, CORNER)]), walk(corner), 20.0))
+    found = stationary_covariance(vehicle_with_road(quarter_car_vehicle([(0.0, CORNER)]), walk(corner), 20.0))
     q, w = 20.0 * Q, 20.0 * corner
     # the matrices themselves are rounded to 1e-16, which the ratio of height to travel multiplies
     assert found.variance[0] == pytest.approx(CORNER.body_acceleration(q, w), rel=1e-10)
@@ -56,15 +56,15 @@ def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
 def test_half_car_splits_into_quarter_cars():
     a, b, v = 1.2, 1.5, 17.0
     front, rear, inertia = split_half_car(CORNER, a, b)
-    vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
-    found = stationary(excited(vehicle, walk(0.0, (a, -b)), v)).variance[0]
+    vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
+    found = stationary_covariance(vehicle_with_road(vehicle, walk(0.0, (a, -b)), v)).variance[0]
     assert found == pytest.approx(half_car_acceleration(CORNER, v * Q, a, b, v), rel=1e-10)
 
 
 @pytest.mark.grounds("closed form")
 def test_scalar_delay_of_the_notes():
     a, tau = 0.7, 1.3
-    found = stationary(system(np.array([[-a]]), [np.ones((1, 1))] * 2, (0.0, tau)))
+    found = stationary_covariance(system(np.array([[-a]]), [np.ones((1, 1))] * 2, (0.0, tau)))
     assert found.variance[0] == pytest.approx((1 + np.exp(-a * tau)) / a, rel=1e-14)
 
 
@@ -72,17 +72,19 @@ def test_scalar_delay_of_the_notes():
 def truck():
     """Three axles, linear, and the road under it in the paper's five cases."""
     vehicle = linearise(load_vehicle("three_axle_truck"))
-    return vehicle, {str(i): excitation(road_of_level(1.0), vehicle.wheels, *case) for i, case in CASES.items()}
+    return vehicle, {
+        str(i): road_excitation(road_of_level(1.0), vehicle.wheels, *case) for i, case in CORRELATION_CASES.items()
+    }
 
 
 def test_delay_of_zero_is_one_input_and_a_very_long_one_is_independence(truck):
     vehicle, roads = truck
-    one = excited(vehicle, roads["3"], 20.0)
-    at_once = stationary(replace(one, delays=(0.0, 0.0, 0.0)))
-    joined = stationary(replace(one, B=(sum(one.B),), D=(sum(one.D),), delays=(0.0,)))
+    one = vehicle_with_road(vehicle, roads["3"], 20.0)
+    at_once = stationary_covariance(replace(one, delays=(0.0, 0.0, 0.0)))
+    joined = stationary_covariance(replace(one, B=(sum(one.B),), D=(sum(one.D),), delays=(0.0,)))
     np.testing.assert_array_equal(at_once.variance, joined.variance)
-    apart = stationary(replace(one, independent=True))
-    late = stationary(replace(one, delays=(0.0, 1e6, 2e6)))
+    apart = stationary_covariance(replace(one, independent=True))
+    late = stationary_covariance(replace(one, delays=(0.0, 1e6, 2e6)))
     np.testing.assert_allclose(late.variance, apart.variance, rtol=1e-14)
     assert abs(at_once.variance / apart.variance - 1).max() > 0.1  # the limits differ, or the test says nothing
 
@@ -91,8 +93,8 @@ def test_delay_of_zero_is_one_input_and_a_very_long_one_is_independence(truck):
 @pytest.mark.parametrize("case", ["1", "2", "3", "4", "5"])
 def test_frequency_quadrature_agrees(truck, case):
     vehicle, roads = truck
-    found = stationary(excited(vehicle, roads[case], 13.0))
-    other = quadrature(vehicle, roads[case], 13.0)
+    found = stationary_covariance(vehicle_with_road(vehicle, roads[case], 13.0))
+    other = variances_by_quadrature(vehicle, roads[case], 13.0)
     assert found.residual < 1e-15 and found.error.max() < 1e-11
     np.testing.assert_allclose(found.variance, other.variance, rtol=1e-10)  # both claim 1e-11
     assert other.error.max() < 1e-10
@@ -101,9 +103,9 @@ def test_frequency_quadrature_agrees(truck, case):
 def test_spectra_hold_the_delays(truck):
     vehicle, roads = truck
     omega = np.linspace(0.01, 400.0, 4_000)
-    dense = 2 * np.trapezoid(spectra(vehicle, roads["3"], 13.0, omega)[:, 0], omega)
+    dense = 2 * np.trapezoid(spectral_densities(vehicle, roads["3"], 13.0, omega)[:, 0], omega)
     # a body acceleration has all but 1e-4 of its variance below 400 rad/s
-    assert dense == pytest.approx(quadrature(vehicle, roads["3"], 13.0).variance[0], rel=1e-3)
+    assert dense == pytest.approx(variances_by_quadrature(vehicle, roads["3"], 13.0).variance[0], rel=1e-3)
 
 
 @pytest.mark.grounds("closed form")
@@ -115,8 +117,10 @@ def test_the_five_covariances_of_the_road_itself(truck):
     heights += tuple(Output(f"z{i}+z{i + 2}", "m", "road", no, no, no, rows[i] + rows[i + 2], no[:6]) for i in (0, 1))
     from models.road.two_track import input_covariance
 
-    for case, (left_right, front_rear) in CASES.items():
-        found = stationary(excited(replace(vehicle, outputs=heights), roads[str(case)], 13.0)).variance
+    for case, (left_right, front_rear) in CORRELATION_CASES.items():
+        found = stationary_covariance(
+            vehicle_with_road(replace(vehicle, outputs=heights), roads[str(case)], 13.0)
+        ).variance
         wanted = input_covariance(road_of_level(1.0), vehicle.wheels, left_right, front_rear)
         np.testing.assert_allclose(found[:6], np.diag(wanted), rtol=1e-12)
         both = [wanted[i, i] + wanted[i + 2, i + 2] + 2 * wanted[i, i + 2] for i in (0, 1)]
@@ -124,22 +128,22 @@ def test_the_five_covariances_of_the_road_itself(truck):
 
 
 def test_tyre_damping_under_a_road_of_first_order_leaves_wheel_and_load_without_a_variance():
-    vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
-    found = stationary(excited(vehicle, walk(0.3), 20.0))
+    vehicle = quarter_car_vehicle([(0.0, CORNER)], tyre_damping=100.0)
+    found = stationary_covariance(vehicle_with_road(vehicle, walk(0.3), 20.0))
     assert found.status == (FINITE, FINITE, FINITE, FINITE, INFINITE, INFINITE)
     assert np.isinf(found.variance[4:]).all() and np.isfinite(found.variance[:4]).all()
     assert "white noise" in found.reason[4] and "second order" in found.reason[4]
-    other = quadrature(vehicle, walk(0.3), 20.0)
+    other = variances_by_quadrature(vehicle, walk(0.3), 20.0)
     assert np.isinf(other.variance[4:]).all()
     np.testing.assert_allclose(found.variance[:4], other.variance[:4], rtol=1e-10)
-    quick = sweep(lambda speed: vehicle, {"track": walk(0.3)}, [20.0])
-    assert tuple(quick.status[0, 0]) == found.status and not quick.direct
+    quick = variance_sweep(lambda speed: vehicle, {"track": walk(0.3)}, [20.0])
+    assert tuple(quick.status[0, 0]) == found.status and not quick.direct_counts
 
 
 def test_a_free_heading_turns_into_a_lateral_walk():
     """Heading psi' = w, place y' = v psi: variances t and v^2 t^3 / 3."""
     v = 20.0
-    found = stationary(system(np.array([[0.0, v], [0.0, 0.0]]), [np.array([[0.0], [1.0]])]))
+    found = stationary_covariance(system(np.array([[0.0, v], [0.0, 0.0]]), [np.array([[0.0], [1.0]])]))
     assert found.status == (DIFFUSING, DIFFUSING) and np.isinf(found.variance).all()
     np.testing.assert_allclose(found.rate, [v**2 / 3, 1.0])
     assert tuple(found.power) == (3, 1)
@@ -148,7 +152,7 @@ def test_a_free_heading_turns_into_a_lateral_walk():
 
 def test_three_integrators_in_a_row_walk_with_the_fifth_power():
     """The response t^2 / 2 to a unit of noise has the square integral t^5 / 20."""
-    found = stationary(system(np.eye(3, k=1), [np.array([[0.0], [0.0], [1.0]])]))
+    found = stationary_covariance(system(np.eye(3, k=1), [np.array([[0.0], [0.0], [1.0]])]))
     np.testing.assert_allclose(found.rate, [1 / 20, 1 / 3, 1.0])
     assert tuple(found.power) == (5, 3, 1)
 
@@ -159,16 +163,16 @@ def test_what_the_first_axle_starts_the_second_may_stop():
     A = np.array([[0.0, v, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -a]])
     C = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
     first, second = np.array([[0.0], [1.0], [1.0]]), np.array([[0.0], [-1.0], [0.0]])
-    found = stationary(system(A, [first, second], (0.0, tau), C))
+    found = stationary_covariance(system(A, [first, second], (0.0, tau), C))
     assert found.status == (DIFFUSING, FINITE, FINITE)
     assert (found.rate[0], found.power[0]) == (pytest.approx((v * tau) ** 2, rel=1e-9), 1)
     assert found.variance[1] == pytest.approx(tau, rel=1e-12)
     assert found.variance[2] == pytest.approx(tau + 1 / (2 * a) + 2 * (1 - np.exp(-a * tau)) / a, rel=1e-12)
     put_back = np.array([[-v * tau], [-1.0], [0.0]])  # y returns to where it was: nothing is left of the first hit
-    stopped = stationary(system(A, [first, put_back], (0.0, tau), C))
+    stopped = stationary_covariance(system(A, [first, put_back], (0.0, tau), C))
     assert stopped.status == (FINITE,) * 3
     assert stopped.variance[0] == pytest.approx(v**2 * tau**3 / 3, rel=1e-12)
-    apart = stationary(system(A, [first, second], (0.0, tau), C, independent=True))
+    apart = stationary_covariance(system(A, [first, second], (0.0, tau), C, independent=True))
     assert apart.status == (DIFFUSING,) * 3 and apart.rate[1] == pytest.approx(2.0)
 
 
@@ -176,10 +180,10 @@ def test_an_undamped_spring_swings_ever_more_unless_the_delay_is_half_its_period
     """x'' + w^2 x = noise: the variance of x grows by 1 / (2 w^2) per second."""
     w = 9.0
     A, B = np.array([[0.0, 1.0], [-(w**2), 0.0]]), np.array([[0.0], [1.0]])
-    found = stationary(system(A, [B]))
+    found = stationary_covariance(system(A, [B]))
     assert found.status == (DIFFUSING,) * 2
     np.testing.assert_allclose(found.rate, [1 / (2 * w**2), 0.5], rtol=1e-9)
-    stopped = stationary(system(A, [B, B], (0.0, np.pi / w)))
+    stopped = stationary_covariance(system(A, [B, B], (0.0, np.pi / w)))
     assert stopped.status == (FINITE,) * 2
     assert stopped.variance[0] == pytest.approx(np.pi / (2 * w**3), rel=1e-12)
 
@@ -192,19 +196,23 @@ def free():
     vehicle = load_vehicle("r19_free")
     steered = tuple(replace(f, roll_steer=0.05 if f.name in ("fl", "fr") else 0.0) for f in vehicle.side_forces)
     plain = linear(vehicle, 20.0)
-    return plain, linear(replace(vehicle, side_forces=steered), 20.0), excitation(road_of_level(0.69342), plain.wheels)
+    return (
+        plain,
+        linear(replace(vehicle, side_forces=steered), 20.0),
+        road_excitation(road_of_level(0.69342), plain.wheels),
+    )
 
 
 def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
     plain, _, road = free
-    one = excited(plain, road, 20.0)
+    one = vehicle_with_road(plain, road, 20.0)
     split = split_marginal(one.A)
-    assert (split.marginal, split.zeros) == (3, 3)
+    assert (split.count_of_marginal_states, split.zeros) == (3, 3)
     assert np.linalg.matrix_rank(split.M, 1e-6) == 1  # y and yaw are one Jordan pair
-    found = stationary(one)
+    found = stationary_covariance(one)
     assert set(found.status) == {FINITE}
     assert "nothing pulls back" in found.reason[0]
-    other = quadrature(plain, road, 20.0)
+    other = variances_by_quadrature(plain, road, 20.0)
     # the place to the side feels the rounding of a stiffness that should vanish, and says so
     assert (abs(found.variance / other.variance - 1) < other.error + 1e-10).all()
     assert other.error.max() < 1e-6 and np.median(other.error) < 1e-10
@@ -213,15 +221,15 @@ def test_a_free_vehicle_has_its_three_zeros_and_no_output_minds(free):
 def test_what_symmetry_keeps_at_rest_does_not_diffuse_by_rounding(free):
     """Alike tracks move nothing sideways, with roll steer or without: such variances are zero, up to rounding."""
     for vehicle in free[:2]:
-        alike = excitation(road_of_level(0.69342), vehicle.wheels, "equal", "delayed")
-        found = stationary(excited(vehicle, alike, 30.0))
+        alike = road_excitation(road_of_level(0.69342), vehicle.wheels, "equal", "delayed")
+        found = stationary_covariance(vehicle_with_road(vehicle, alike, 30.0))
         assert set(found.status) == {FINITE}
         assert found.variance[found.names.index("lateral position")] < 1e-24  # m^2
 
 
 def test_roll_steer_makes_it_diffuse_sideways(free):
     _, steered, road = free
-    found = stationary(excited(steered, road, 20.0))
+    found = stationary_covariance(vehicle_with_road(steered, road, 20.0))
     diffusing = [name for name, status in zip(found.names, found.status, strict=True) if status == DIFFUSING]
     assert diffusing == ["lateral position"]
     at = found.names.index("lateral position")
@@ -232,7 +240,7 @@ def test_roll_steer_makes_it_diffuse_sideways(free):
 @pytest.mark.parametrize("installed", [False, True])
 def test_results_do_not_depend_on_slycot(free, truck, monkeypatch, installed):
     plain, _, road = free
-    one = stationary(excited(plain, road, 20.0)).variance
+    one = stationary_covariance(vehicle_with_road(plain, road, 20.0)).variance
 
     def never(*_, **__):
         raise AssertionError("slycot was asked")
@@ -240,35 +248,37 @@ def test_results_do_not_depend_on_slycot(free, truck, monkeypatch, installed):
     monkeypatch.setattr("control.exception.slycot_installed", installed)
     for name in ("sb03md", "sb04md"):
         monkeypatch.setattr(f"control.mateqn.{name}", never)
-    np.testing.assert_array_equal(stationary(excited(plain, road, 20.0)).variance, one)
+    np.testing.assert_array_equal(stationary_covariance(vehicle_with_road(plain, road, 20.0)).variance, one)
 
 
 def test_an_unstable_vehicle_is_refused_in_words():
     with pytest.raises(Unstable, match=r"swings at 11\.8\d? Hz grows at a rate of 0\.06\d+ 1/s") as told:
-        stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), walk(0.3), 20.0))
+        stationary_covariance(vehicle_with_road(quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))]), walk(0.3), 20.0))
     assert told.value.growth == pytest.approx(0.064, rel=0.01)
     with pytest.raises(Unstable, match="does not swing"):
-        stationary(system(np.array([[0.5]]), [np.ones((1, 1))]))
+        stationary_covariance(system(np.array([[0.5]]), [np.ones((1, 1))]))
 
 
 def test_a_sweep_names_the_speed_at_which_a_vehicle_is_unstable():
-    vehicle = corners([(0.0, replace(CORNER, c=-5.0))])
+    vehicle = quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))])
     with pytest.raises(Unstable, match="must be stable at 20 m/s"):
-        sweep(lambda speed: vehicle, {"": walk(0.3)}, [20.0])
+        variance_sweep(lambda speed: vehicle, {"": walk(0.3)}, [20.0])
 
 
 def test_slow_motions_beside_a_wheel_of_no_mass_are_not_called_free():
     """1e12 1/s beside 10 1/s: they fall below the accuracy of the matrix, and no load diffuses because of that."""
-    vehicle = corners([(0.0, replace(CORNER, m_u=1e-9))])
+    vehicle = quarter_car_vehicle([(0.0, replace(CORNER, m_u=1e-9))])
     with pytest.raises(InputError, match=r"vehicle: has a motion so fast, [\d.]+e\+12 1/s, that its slow ones"):
-        stationary(excited(vehicle, walk(0.3), 20.0))
+        stationary_covariance(vehicle_with_road(vehicle, walk(0.3), 20.0))
 
 
 def test_a_weighted_output_is_that_of_the_quadrature(truck):
     vehicle, roads = truck
-    found = stationary(weighted(excited(vehicle, roads["3"], 20.0), {"driver": "Wk"}))
+    found = stationary_covariance(
+        system_with_weightings(vehicle_with_road(vehicle, roads["3"], 20.0), {"driver": "Wk"})
+    )
     factor = {"driver": WEIGHTINGS["Wk"].response}
-    other = quadrature(vehicle, roads["3"], 20.0, factor)
+    other = variances_by_quadrature(vehicle, roads["3"], 20.0, factor)
     at = [output.name for output in vehicle.outputs].index("driver")
     assert found.variance[-1] == pytest.approx(other.variance[at], rel=1e-10)
 
@@ -277,9 +287,9 @@ def test_a_weighted_output_is_that_of_the_quadrature(truck):
 def test_the_fast_route_equals_the_direct_one(truck):
     vehicle, roads = truck
     filters = {"driver": "Wk", "cab": "Wk", "frame centre": "Wd"}  # repeated poles
-    quick = sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
-    slow = sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
-    assert quick.direct == {} and slow.direct == {ASKED_FOR: 10}
+    quick = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters)
+    slow = variance_sweep(lambda speed: vehicle, roads, [3.0, 30.0], filters, fast=False)
+    assert quick.direct_counts == {} and slow.direct_counts == {ASKED_FOR: 10}
     assert quick.outputs[-1] == "frame centre Wd" and (quick.status == slow.status).all()
     told = slow.variance > 1e-20  # below, an output is zero by symmetry
     np.testing.assert_allclose(quick.variance[told], slow.variance[told], rtol=1e-10)
@@ -287,6 +297,8 @@ def test_the_fast_route_equals_the_direct_one(truck):
 
 def test_the_fast_route_says_when_it_is_not_taken(free):
     plain, _, road = free
-    found = sweep(lambda speed: plain, {"3": road}, [20.0])
-    assert sum(found.direct.values()) == 1 and "parallel" in next(iter(found.direct))
-    np.testing.assert_array_equal(found.variance[0, 0], stationary(excited(plain, road, 20.0)).variance)
+    found = variance_sweep(lambda speed: plain, {"3": road}, [20.0])
+    assert sum(found.direct_counts.values()) == 1 and "parallel" in next(iter(found.direct_counts))
+    np.testing.assert_array_equal(
+        found.variance[0, 0], stationary_covariance(vehicle_with_road(plain, road, 20.0)).variance
+    )

@@ -12,7 +12,7 @@ from models.multibody.plain.hubs import PlainHubs
 from models.multibody.plain.motion import FIRST, PLACE, REST
 from models.systems.measured.sections import AccelerometerPoint, Sections
 from models.vehicles.cut_vehicle import CutVehicle, cut
-from validation.spatial.cars import r19, rough_car, static, twin
+from validation.spatial.cars import r19, rough_car, static_forces, twin
 from validation.spatial.written_equations import cut_state
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -34,7 +34,7 @@ def turning() -> CutVehicle:
 
 def hub_inputs_of(vehicle: CutVehicle, rows: int) -> HubInputs:
     """Static loads and 400 N at random, and a guide that enforces roll and pitch."""
-    hubs = static(vehicle, rows).hubs
+    hubs = static_forces(vehicle, rows).hubs
     return HubInputs(hubs + RNG.normal(0.0, 400.0, hubs.shape), "hub", guide=RNG.normal(0.0, 0.02, (rows, 6)))
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from models.core.discretisation import (
-    REFUSED,
-    WARNED,
+    REFUSED_SHARE,
+    WARNED_SHARE,
     Series,
     by_chance,
     error_lines,
@@ -79,8 +79,8 @@ def test_a_large_error_is_a_warning_with_the_step_that_cures_it():
     run = told(2, size, 2)
     (line,) = error_lines(run)
     advised = errors_of(run)["heave"].step
-    assert "WARNING, use at most" in line and f"{advised:g} s" in line and errors_of(run)["heave"].share > WARNED
-    assert errors_of(told(2, size, 2, advised))["heave"].share < WARNED
+    assert "WARNING, use at most" in line and f"{advised:g} s" in line and errors_of(run)["heave"].share > WARNED_SHARE
+    assert errors_of(told(2, size, 2, advised))["heave"].share < WARNED_SHARE
 
 
 def test_what_is_no_answer_is_refused_with_the_step_to_use():
@@ -88,7 +88,7 @@ def test_what_is_no_answer_is_refused_with_the_step_to_use():
     with pytest.raises(RunFailed, match=r"this is no answer: heave errs by .* use at most") as refusal:
         told(2, size, 2)
     partial = errors_of(refusal.value.partial)["heave"]
-    assert partial.share > REFUSED and errors_of(told(2, size, 2, partial.step))["heave"].share < WARNED
+    assert partial.share > REFUSED_SHARE and errors_of(told(2, size, 2, partial.step))["heave"].share < WARNED_SHARE
 
 
 def test_where_no_longer_step_can_be_half_of_it_tells():

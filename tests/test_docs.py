@@ -16,7 +16,7 @@ from docs.pages import ROOT, blocks, pages
 from models.core.errors import InputError
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from models.vehicles.vehicle_file import build_vehicle
-from studies.command.asked import KNOWN_SYSTEMS, SCENES, engines_of, plan_of
+from studies.command.asked import KNOWN_SYSTEMS, SCENES_FOLDER, engines_of, plan_of
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 each_page = pytest.mark.parametrize("name", PAGES)
@@ -80,9 +80,9 @@ def test_every_scene_key_has_a_meaning():
         assert [key.name for key in scene_keys.keys_of(scene_keys.scene_model(system)) if not key.meaning] == []
 
 
-@pytest.mark.parametrize("scene", sorted(path.stem for path in SCENES.glob("*.toml")))
+@pytest.mark.parametrize("scene", sorted(path.stem for path in SCENES_FOLDER.glob("*.toml")))
 def test_every_key_of_a_scene_that_comes_with_twinrig_is_in_the_reference(scene):
-    table = tomllib.loads((SCENES / f"{scene}.toml").read_text())
+    table = tomllib.loads((SCENES_FOLDER / f"{scene}.toml").read_text())
     system = table.get("system", DEFAULT_SYSTEM)
     if system in SYSTEMS:
         section = scene_keys.PAGE.read_text().partition(f"\n## {system}\n")[2].partition("\n## ")[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.effects.contact_points import compression
@@ -157,9 +157,11 @@ def test_contact_points_find_the_road_that_made_the_forces(tmp_path):
 
 
 def test_noise_is_named_by_its_seed_and_independent_of_the_step(forces):
-    long = normal(4, 0, 9000, 2)
-    assert np.array_equal(normal(4, 0, 300, 2, first=4000), long[4000:4300])  # across a block's edge
-    assert not np.array_equal(long[:5], normal(5, 0, 5, 2)) and not np.array_equal(long[:5], normal(4, 1, 5, 2))
+    long = normal_samples(4, 0, 9000, 2)
+    assert np.array_equal(normal_samples(4, 0, 300, 2, first=4000), long[4000:4300])  # across a block's edge
+    assert not np.array_equal(long[:5], normal_samples(5, 0, 5, 2)) and not np.array_equal(
+        long[:5], normal_samples(4, 1, 5, 2)
+    )
     own = scene(forces, {"force_noise": {"deviation": 40.0}}, interpolation="held")
     fine = own.model_copy(update={"run": own.run.model_copy(update={"step": 1.25e-4})})
     coarse, finer = simulate(own, "reference").states, simulate(fine, "reference").states[::4]

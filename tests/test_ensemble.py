@@ -17,13 +17,13 @@ import pytest
 
 from models.core import whole_files
 from models.core.errors import InputError, RunFailed
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.engines import protocol
 from models.ensemble import store, workers
 from models.ensemble.runner import Blocks, PathFailed, run_paths
-from models.ensemble.statistics import deviation, quantile
-from models.ensemble.workers import cluster, processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
+from models.ensemble.statistics import deviation_with_error, quantile_with_interval
+from models.ensemble.workers import dask_workers, process_pool
+from models.systems.pitch_plane.noise_paths import NoisePaths, largest_difference, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
@@ -108,7 +108,7 @@ def test_threads_and_order_change_nothing(folder, expected, make):
 
 
 def test_processes_change_nothing(folder, expected):
-    with processes(2) as executor:
+    with process_pool(2) as executor:
         assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
 
 
@@ -116,7 +116,7 @@ def test_a_dask_cluster_changes_nothing(folder, expected):
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as local:  # noqa: SIM117
-        with cluster(local.scheduler_address) as executor:
+        with dask_workers(local.scheduler_address) as executor:
             assert same(run_paths(job(folder), PATHS, executor=executor, blocks=Blocks(BLOCK)), expected)
 
 
@@ -130,7 +130,7 @@ def test_a_dask_cluster_changes_nothing(folder, expected):
 )
 def test_a_cluster_that_is_not_there_is_named(address, said, monkeypatch):
     monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", "0.2s")
-    with pytest.raises(InputError, match=said), cluster(address):
+    with pytest.raises(InputError, match=said), dask_workers(address):
         pass
 
 
@@ -210,7 +210,7 @@ def test_an_interrupt_leaves_the_finished_blocks_and_begins_no_others(folder, ex
 def test_an_interrupt_while_workers_start_reaches_none_of_them():
     """A terminal sends Ctrl-C to all of its processes; one that still imports would die of it and break the pool."""
     others = {child.pid for child in active_children()}
-    with processes(1) as pool:
+    with process_pool(1) as pool:
         (worker,) = (child for child in active_children() if child.pid not in others)
         os.kill(worker.pid, signal.SIGINT)
         assert pool.submit(abs, -1).result(timeout=60) == 1
@@ -241,7 +241,7 @@ def _full_after(writes):
 
 
 def test_two_processes_never_work_in_one_folder(folder, tmp_path):
-    with store.locked(tmp_path), pytest.raises(InputError, match="another process is at work"):
+    with store.exclusive_folder(tmp_path), pytest.raises(InputError, match="another process is at work"):
         run_paths(job(folder), 2, tmp_path)
     (
         tmp_path / whole_files.PARTIAL_NAME.format("block 000000.npz", ended(), ".npz")
@@ -282,7 +282,7 @@ def test_other_forces_other_equations_and_other_counts_are_refused(folder, tmp_p
         run_paths(louder, 2, tmp_path)
     with pytest.raises(InputError, match="paths = 2"):
         run_paths(own, 3, tmp_path)
-    monkeypatch.setattr(store, "_code", lambda: "changed")
+    monkeypatch.setattr(store, "_code_checksum", lambda: "changed")
     with pytest.raises(InputError, match="code of models"):
         run_paths(own, 2, tmp_path)
 
@@ -340,11 +340,13 @@ def test_engines_repeat_the_paths(folder, interpolation):
     reference = run_paths(noise_paths(own, TIMES), 3)
     one, two = (run_paths(mujoco_threads(own, TIMES, threads=threads), 3) for threads in (1, 2))
     assert same(one, two)
-    assert gap(reference, one, TIMES) < 1e-12
-    assert gap(reference, run_paths(noise_paths(own, TIMES, engine="exudyn"), 2), TIMES) < 1e-12
+    assert largest_difference(reference, one, TIMES) < 1e-12
+    assert largest_difference(reference, run_paths(noise_paths(own, TIMES, engine="exudyn"), 2), TIMES) < 1e-12
     other = run_paths(noise_paths(scene(folder, seed=4, interpolation=interpolation), TIMES), 3)
-    assert gap(reference, other, TIMES) > 1e-6
-    assert math.isnan(gap(reference | {"drift_off": np.full(3, 0.1)}, other, TIMES))  # only the common start is left
+    assert largest_difference(reference, other, TIMES) > 1e-6
+    assert math.isnan(
+        largest_difference(reference | {"drift_off": np.full(3, 0.1)}, other, TIMES)
+    )  # only the common start is left
 
 
 def test_what_cannot_be_an_ensemble_is_refused(folder):
@@ -369,19 +371,19 @@ def _adaptive():
 
 def test_the_standard_error_of_a_deviation_is_its_scatter():
     """2,000 samples of 100 normal numbers: the errors' mean is within 10 % of the scatter (its own error is 1.6 %)."""
-    draws = normal(5, 0, 2000 * 100, 1).reshape(2000, 100)
-    found = np.array([deviation(row) for row in draws])
+    draws = normal_samples(5, 0, 2000 * 100, 1).reshape(2000, 100)
+    found = np.array([deviation_with_error(row) for row in draws])
     assert found[:, 0].std() == pytest.approx(found[:, 1].mean(), rel=0.1)
     assert found[:, 0].mean() == pytest.approx(1.0, abs=0.01)  # E[s] = 1 - 1/(4 n) = 0.9975
 
 
 def test_the_interval_of_a_quantile_covers_it():
     """Of 1,000 samples of 200 numbers some 950 intervals hold the true median; 4.5 binomial sd of 7 either side."""
-    draws = normal(6, 0, 1000 * 200, 1).reshape(1000, 200)
-    held = sum(low <= 0 <= high for _, low, high in (quantile(row, 0.5) for row in draws))
+    draws = normal_samples(6, 0, 1000 * 200, 1).reshape(1000, 200)
+    held = sum(low <= 0 <= high for _, low, high in (quantile_with_interval(row, 0.5) for row in draws))
     assert 920 <= held <= 980
-    assert quantile(np.array([1.0, 2.0, np.inf, np.inf]), 0.75)[0] == np.inf
-    assert quantile(np.array([1.0, 2.0, np.inf, np.inf]), 0.5)[0] == 2.0
+    assert quantile_with_interval(np.array([1.0, 2.0, np.inf, np.inf]), 0.75)[0] == np.inf
+    assert quantile_with_interval(np.array([1.0, 2.0, np.inf, np.inf]), 0.5)[0] == 2.0
 
 
 SHORT = (

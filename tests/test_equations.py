@@ -202,7 +202,7 @@ def test_accelerations_agree_at_any_sample(tmp_path, interpolation, guided):
     """The audit of force-excited scenes: every implementation reads the sample of the asked time."""
     from models.core.time_series import write_time_series
     from models.engines.protocol import build
-    from models.systems.pitch_plane.scene import assemble, settings_of
+    from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
     from models.systems.pitch_plane.scene import build as build_scene
 
     t = 1e-3 * np.arange(301)
@@ -212,7 +212,7 @@ def test_accelerations_agree_at_any_sample(tmp_path, interpolation, guided):
     effects = {"wheel_forces": {"file": "f.csv", "interpolation": interpolation, "accept": meant}}
     effects |= {"prescribed_pitch": {"file": "p.csv"}} if guided else {}
     scene = build_scene({"title": "test", "run": {"duration": 0.3, "step": 1e-3}, "effects": effects}, "", tmp_path)
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     # Exudyn's generalised-alpha refuses held samples, and a prescribed pitch has no other integrator there
     engines = ("reference", "mujoco") if guided and interpolation == "held" else ("reference", "exudyn", "mujoco")
     models = [build(engine, assembly, settings_of(scene, engine)) for engine in engines]

@@ -9,15 +9,15 @@ from matplotlib.figure import Figure
 
 from models.drawing.figures import (
     COLUMN_WIDTH,
+    CURVE_COLOURS,
     SMALL_TEXT,
-    TURNS,
     about_one,
-    heading,
+    add_heading,
     legend_below,
     panels,
     save,
     subplots,
-    wrapped,
+    wrapped_text,
 )
 
 
@@ -30,7 +30,7 @@ def usual():
         axis.plot(times, np.sin(9.0 * times), label="sine")
         axis.set(xlabel="time [s]", ylabel="displacement [mm]", title="A panel")
     legend_below(figure, *axes)
-    heading(figure, "A figure as all of them are")
+    add_heading(figure, "A figure as all of them are")
     yield figure, axes
 
 
@@ -126,7 +126,7 @@ def test_pages_of_drawings_use_the_palette():
     root = Path(__file__).parents[1]
     files = [file for place in ("studies", "validation", "models/drawing") for file in (root / place).rglob("*.py")]
     others = [file for file in files if not apart & set(file.parts) and file.name != "figures.py"]
-    written = {file.name: colour for file in others for colour in TURNS if colour in file.read_text()}
+    written = {file.name: colour for file in others for colour in CURVE_COLOURS if colour in file.read_text()}
     assert len(others) > 30 and written == {}
 
 
@@ -145,7 +145,7 @@ def test_places_without_a_panel_are_taken_away():
 def test_lines_are_broken_where_a_figure_ends():
     figure = Figure(figsize=(4.0, 1.0))
     text = figure.text(
-        0.0, 0.5, wrapped("every one of these words is short " * 6, 4.0, SMALL_TEXT), fontsize=SMALL_TEXT
+        0.0, 0.5, wrapped_text("every one of these words is short " * 6, 4.0, SMALL_TEXT), fontsize=SMALL_TEXT
     )
     figure.draw_without_rendering()
     assert "\n" in text.get_text() and text.get_window_extent().width < figure.bbox.width

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.result_folders import COMMAND, drop_if_empty, new_folder, resumed_folder
+from models.core.result_folders import COMMAND_FILE, drop_if_empty, new_folder, resumed_folder
 from models.core.whole_files import PARTIAL_NAME
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
-from studies.single_run import difference
+from studies.single_run import largest_state_difference
 
 
 def test_many_runs_at_once_get_a_folder_each(tmp_path, monkeypatch):
@@ -55,7 +55,7 @@ def test_a_resumed_folder_keeps_no_part_of_a_killed_process_and_those_of_living_
 
 def test_a_run_that_saved_nothing_leaves_nothing(tmp_path):
     folder = new_folder(tmp_path / "empty", "x")
-    assert [path.name for path in folder.iterdir()] == [COMMAND]
+    assert [path.name for path in folder.iterdir()] == [COMMAND_FILE]
     drop_if_empty(folder)
     assert not folder.exists()
 
@@ -72,4 +72,4 @@ def test_rows_at_other_times_are_compared_at_their_own():
     grid, adaptive = simulate(scene, "reference"), simulate(scene, "exudyn")
     assert not np.allclose(adaptive.times, grid.times[: len(adaptive.times)], rtol=0, atol=1e-6)
     # RK4 at 1 ms is right to some 1e-5 here; the spline between its rows adds less
-    assert difference(grid, adaptive) < 1e-4
+    assert largest_state_difference(grid, adaptive) < 1e-4

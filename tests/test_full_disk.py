@@ -4,7 +4,7 @@ import errno
 
 import pytest
 
-from models.core.result_folders import COMMAND
+from models.core.result_folders import COMMAND_FILE
 from models.core.whole_files import reason_of, whole_file, write_whole
 from validation.common import full_disk
 from validation.common.full_disk import files_of_at_most
@@ -26,7 +26,7 @@ def test_full_at_twenty_moments(twinrig, empty_folder, capsys, share):
     assert code == 1
     assert said.startswith("twinrig: the results could not be written: the disk is full (") and said.count("\n") == 1
     left = sizes(empty_folder / "full") if (empty_folder / "full").exists() else {}
-    assert all(size == whole[name] for name, size in left.items() if name.name != COMMAND)
+    assert all(size == whole[name] for name, size in left.items() if name.name != COMMAND_FILE)
     assert not any(name.name.endswith(".part") or ".part." in name.name for name in left)
 
 
@@ -53,6 +53,6 @@ def test_other_reasons_keep_their_words():
 def test_a_writer_that_leaves_its_part_is_seen(tmp_path, monkeypatch):
     """The fault to be seen: the file appears under its own name as it is written."""
     (tmp_path / "right").mkdir(), (tmp_path / "wrong").mkdir()
-    assert full_disk.damage(tmp_path / "right") == 0
+    assert full_disk.damaged_moments(tmp_path / "right") == 0
     monkeypatch.setattr("models.core.result.write_whole", lambda path, content: path.write_bytes(content))
-    assert full_disk.damage(tmp_path / "wrong") > full_disk.MOMENTS // 2
+    assert full_disk.damaged_moments(tmp_path / "wrong") > full_disk.MOMENTS_TRIED // 2

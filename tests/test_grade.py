@@ -10,10 +10,10 @@ from models.engines.assembly import Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.road import SineProfile, SplineProfile
-from models.road.grade import TRANSITION, Graded
+from models.road.grade import TRANSITION_LENGTH, Graded
 from models.road.signal import RoadUnderWheels
 from models.road.study import hills_road
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 
 FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")
@@ -23,9 +23,9 @@ FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")
 @pytest.mark.parametrize("grade", [0.1, -0.3])
 def test_height_is_that_of_its_definition(grade):
     road, slope = Graded(FLAT, grade, 40.0), math.tan(grade)
-    s = np.array([-5.0, 40.0, 40.0 + TRANSITION, 1000.0])
+    s = np.array([-5.0, 40.0, 40.0 + TRANSITION_LENGTH, 1000.0])
     # up to rounding of some 100 m
-    climbed = np.array([0.0, 0.0, TRANSITION / 2, 940.0])
+    climbed = np.array([0.0, 0.0, TRANSITION_LENGTH / 2, 940.0])
     np.testing.assert_allclose(road.height_and_slope(s)[0], -slope * climbed, atol=1e-13)
     np.testing.assert_allclose(road.height_and_slope(s)[1], -slope * np.array([0, 0, 1, 1]), atol=1e-15)
 
@@ -72,7 +72,7 @@ def test_steady_climb_has_the_pitch_of_the_grade(engine, parameters, geometry):
     own = build_scene(
         {"title": "climb", "vehicle": {"parameters": parameters, "geometry": geometry}, "run": {"duration": duration}}
     )
-    assembly = assemble(own)
+    assembly = assembly_of_scene(own)
     rest, wheelbase = assembly.initial[3], assembly.parameters.a + assembly.parameters.b
     road = RoadUnderWheels(Graded(FLAT, grade, 0.0), 20.0, wheelbase)
     run = build(engine, assembly.with_input("road", road), Settings(RECOMMENDED[engine], 1e-3, duration)).run()
@@ -93,7 +93,7 @@ def scene(source, **keys):
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize(("source", "keys"), [("study", {}), ("hills", {}), ("iso8608", {"road_class": "C"})])
 def test_grade_of_a_scene_is_added_after_the_fade_in(source, keys):
-    plain, graded = (assemble(scene(source, **keys, **more)).input for more in ({}, {"grade": 0.1}))
+    plain, graded = (assembly_of_scene(scene(source, **keys, **more)).input for more in ({}, {"grade": 0.1}))
     difference = graded.sample(0.0, 1e-3, 5001) - plain.sample(0.0, 1e-3, 5001)
     np.testing.assert_array_equal(difference[:2001], 0.0)  # up to 40 m
     np.testing.assert_allclose(difference[-1, :2], -math.tan(0.1) * np.array([40.0, 38.0]), atol=1e-12)
@@ -101,7 +101,7 @@ def test_grade_of_a_scene_is_added_after_the_fade_in(source, keys):
 
 
 def test_a_grade_that_is_not_named_is_not_computed():
-    assert not isinstance(assemble(scene("hills")).input.profile, Graded)
+    assert not isinstance(assembly_of_scene(scene("hills")).input.profile, Graded)
 
 
 @pytest.mark.parametrize("grade", [0.5, -0.6, float("nan")])
@@ -112,4 +112,4 @@ def test_impossible_grades_are_refused(grade):
 
 def test_a_measured_road_takes_no_grade(tmp_path):
     with pytest.raises(InputError, match="has no meaning for source = 'csv'"):
-        assemble(scene("csv", file="road.csv", beyond_end="refused", grade=0.1))
+        assembly_of_scene(scene("csv", file="road.csv", beyond_end="refused", grade=0.1))

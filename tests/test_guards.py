@@ -15,7 +15,7 @@ from models.engines import protocol, stability
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import balanced, build, guard
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.cases import guards
 from validation.hard_cases import setups
@@ -33,7 +33,7 @@ def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bo
     base, push = setups.vehicle("asymmetric_twin", geometry, g=0.0), 1e-6
     if guided:
         pitch = Smooth(np.zeros((8, 1)), 1e-3, derivatives=2, degree=5)
-        base = setups.guided(base, setups.static_forces(base, 9, 1e-3), pitch)
+        base = setups.guided_vehicle(base, setups.static_forces(base, 9, 1e-3), pitch)
     columns = []
     for i in range(8):
         start = replace(base, initial=push * np.eye(8)[i])
@@ -86,10 +86,10 @@ def test_the_limit_separates_decay_from_growth(engine, integrator):
     linear = stability.linearised(assembly.vehicle)
     limit = stability.limit(integrator, 0.1, 300.0, linear)
     below, above = (float(f"{limit * part:.3g}") for part in (0.97, 1.03))
-    end = setups.unchecked(engine, pushed, below, 400 * below, integrator).states[-1]
+    end = setups.unchecked_run(engine, pushed, below, 400 * below, integrator).states[-1]
     assert np.abs(end - assembly.initial).max() < 1e-4
     try:
-        grown = setups.unchecked(engine, pushed, above, 400 * above, integrator).states
+        grown = setups.unchecked_run(engine, pushed, above, 400 * above, integrator).states
     except RunFailed:
         return
     distance = np.abs(grown - assembly.initial).max(axis=1)
@@ -203,7 +203,7 @@ def test_held_forces_beside_a_prescribed_pitch_do_not_hold_the_pitch():
     base = setups.vehicle()
     forces = setups.static_forces(base, 300, 1e-3, noise=500.0)
     pitch = setups.smooth_pitch(0.02 * np.sin(6.0 * 1e-3 * np.arange(301)), 1e-3)
-    assembly = setups.guided(base, forces, pitch)
+    assembly = setups.guided_vehicle(base, forces, pitch)
     fine = setups.run("reference", assembly, 1.25e-4, 0.2).states[::8]
     adaptive = setups.run("reference", assembly, 1e-3, 0.2, "DOP853").states
     assert np.abs(fine - adaptive).max() < 1e-6  # RK4 at 1/8 of the step; holding the pitch would give 1e-4
@@ -217,4 +217,4 @@ def test_a_start_that_a_prescribed_pitch_would_override_is_refused(tmp_path):
     effects = {"wheel_forces": held, "prescribed_pitch": {"file": "pitch.csv"}}
     table = {"title": "", "run": {"duration": 1.0}, "start": {"pitch": 0.1}, "effects": effects}
     with pytest.raises(InputError, match=r"start\.pitch = 0\.1: the pitch is prescribed"):
-        assemble(build_scene(table, "scene.toml", tmp_path))
+        assembly_of_scene(build_scene(table, "scene.toml", tmp_path))

@@ -13,11 +13,11 @@ from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import Drive, drive_run
 from models.systems.handling.scene import build
-from models.tyre.bristles import FADING_SPEED, brush
+from models.tyre.bristles import FADING_SPEED, brush_forces
 from models.vehicles.free_vehicle import SWAY, free_vehicle
 from models.vehicles.spatial_linear import mass
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.load_transfer import turning, turning_error
+from validation.braking.load_transfer import turning_car, turning_error
 from validation.braking.sprung_box import box
 
 LOAD, MU, A, B, K = 3000.0, 0.8, 0.08, 0.09, 4e7
@@ -26,7 +26,7 @@ R19 = load_vehicle("r19_free")
 
 def tyre(x: float, y: float, turning: float, tread: float, load: float = LOAD) -> np.ndarray:
     """Forces of one tyre that slides."""
-    return brush(load, MU, A, B, K, np.array([[x, y, turning, tread]]))[0]
+    return brush_forces(load, MU, A, B, K, np.array([[x, y, turning, tread]]))[0]
 
 
 def side_force(slip: float) -> float:
@@ -67,7 +67,7 @@ def test_rolling_backwards_is_the_mirror_image() -> None:
     assert np.allclose(tyre(0.1, 0.2, 0.3, -20.0), tyre(-0.1, 0.2, -0.3, 20.0) * [-1, 1, -1], rtol=1e-12)
     speeds = np.linspace(-2.0 * FADING_SPEED, 2.0 * FADING_SPEED, 2001)
     slides = np.column_stack([np.tile([0.002, 0.003, 0.01], (2001, 1)), speeds])
-    found = brush(LOAD, MU, A, B, K, slides)
+    found = brush_forces(LOAD, MU, A, B, K, slides)
     assert np.abs(np.diff(found[:, :2], axis=0)).max() < 2e-2 * np.abs(found[:, :2]).max()  # by 1/1000 of the way
     assert (np.einsum("ij,ij->i", found, slides[:, :3]) <= 0.0).all()
 
@@ -97,7 +97,7 @@ def test_the_chassis_feels_the_inertia_of_the_whole_vehicle_in_roll_and_pitch() 
 
 def test_loads_balance_the_inertia_of_the_whole_vehicle() -> None:
     """Between the sides of a box on springs that turns gently; 1 % of it is still to come after 1 s."""
-    own = turning(box().handling.given, 2e-3)
+    own = turning_car(box().handling.given, 2e-3)
     assert abs(turning_error(drive_run("mujoco", own, 20.0, 1.0))) < 2e-2
 
 

@@ -81,18 +81,18 @@ def test_a_clock_that_keeps_its_last_sample_is_found(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 def test_a_sample_read_one_late_is_found(implementation, monkeypatch, tmp_path):
-    right = signals._placed
+    right = signals._sample_and_fraction
 
     def late(*grid):
         index, part = right(*grid)
         return np.maximum(index - 1, 0), part
 
-    monkeypatch.setattr(signals, "_placed", late)
+    monkeypatch.setattr(signals, "_sample_and_fraction", late)
     assert found(sampled_input, "replay of a ramp", implementation, tmp_path) == "SILENT"
 
 
 def test_a_contact_point_that_forgets_its_past_is_found(monkeypatch, tmp_path):
-    monkeypatch.setattr(contact_effect, "_starts", lambda particular, first, period, tau: particular[0])
+    monkeypatch.setattr(contact_effect, "_start_compressions", lambda particular, first, period, tau: particular[0])
     assert found(contact_points, "contact point along an adaptive run", "exudyn", tmp_path) == "SILENT"
 
 
@@ -116,13 +116,13 @@ def test_without_the_growth_check_an_undamped_run_is_silent(monkeypatch, tmp_pat
 def test_a_refinement_that_takes_a_solution_for_symmetric_is_silent(monkeypatch, tmp_path):
     def askew(A, Q):
         P = lyap(A, Q, method="scipy").astype(np.longdouble)
-        for _ in range(covariance.REFINEMENTS):
+        for _ in range(covariance.MOST_REFINEMENTS):
             half = A.astype(np.longdouble) @ P
             left = lyap(A, (half + half.T + Q).astype(float), method="scipy")
             P = P + left
         return P, left, 0.0
 
-    monkeypatch.setattr(covariance, "lyapunov", askew)
+    monkeypatch.setattr(covariance, "lyapunov_solution", askew)
     assert found(ride, "next to no damping", "reference", tmp_path) == "SILENT"
 
 
@@ -132,7 +132,7 @@ def test_without_sizes_of_their_own_road_states_hide_an_undamped_motion(monkeypa
         return form, scale, float(np.linalg.norm(form, 2))
 
     undamped = marginal._of_undamped
-    monkeypatch.setattr(marginal, "_balanced", balanced)
+    monkeypatch.setattr(marginal, "_balanced_matrix", balanced)
     monkeypatch.setattr(marginal, "_of_undamped", lambda *own: undamped(*own[:-1], np.inf))
     assert found(ride, "no damping, road that next to walks", "reference", tmp_path) == "SILENT"
 
@@ -198,10 +198,10 @@ def test_the_quick_share_has_cases_of_every_family():
 
 
 def test_every_number_of_the_catalogue_has_its_cases():
-    assert list(catalogue.COVERED) == list(range(1, 55))
-    assert all(names for _, names in catalogue.COVERED.values())
-    assert catalogue.missing({case.name for case in ALL}) == []
-    assert catalogue.missing(set()) != []
+    assert list(catalogue.COVERED_CLASSES) == list(range(1, 55))
+    assert all(names for _, names in catalogue.COVERED_CLASSES.values())
+    assert catalogue.missing_cases({case.name for case in ALL}) == []
+    assert catalogue.missing_cases(set()) != []
 
 
 def test_there_are_eighty_cases_without_the_measurement_files():

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.core.discretisation import WARNED, errors_of
+from models.core.discretisation import WARNED_SHARE, errors_of
 from models.core.errors import InputError, Refused, RunFailed
 from models.core.result import load
 from models.engines.cut_vehicle import build
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded, true_run, two_tracks
+from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, true_run, two_tracks
 from models.systems.hub_forces.run import run, with_angles
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import Deviations, estimate, pulled
+from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
 from validation.cases import hub_forces as case
-from validation.spatial.cars import r19, static, twin
+from validation.spatial.cars import r19, static_forces, twin
 
 ALL = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {}}
 
@@ -62,7 +62,7 @@ def measured():
     car, step = r19(), 2e-3
     hub_inputs = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
     true = true_run("mujoco", car, hub_inputs, "hub", step, 1.0)
-    return car, true, *recorded(true, "hub", 1)
+    return car, true, *recorded_measurement(true, "hub", 1)
 
 
 @pytest.mark.grounds("closed form")
@@ -87,7 +87,10 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
     free, drawn = (
         build("mujoco", car, d, 2e-3, 1.0).run()
-        for d in (shifted.hub_inputs(2e-3, 500), pulled(shifted.hub_inputs(2e-3, 500), car, tilt, 2e-3, 2.0))
+        for d in (
+            shifted.hub_inputs(2e-3, 500),
+            inputs_with_moments(shifted.hub_inputs(2e-3, 500), car, tilt, 2e-3, 2.0),
+        )
     )
     off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
     assert off[0] > 0.3 and off[1] < 0.02
@@ -142,11 +145,11 @@ def test_one_clear_message(change, told):
 def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told():
     car = r19()
     with pytest.raises(Refused, match="rows"):
-        build("mujoco", car, static(car, 7), 1e-3, 1.0)
+        build("mujoco", car, static_forces(car, 7), 1e-3, 1.0)
     start = np.zeros(38)
     start[19 + PITCH] = 3.0
     with pytest.raises(RunFailed, match="pitches by more than"):
-        build("mujoco", car, static(car, 1201), 1e-3, 0.6).run(*np.split(start, 2))
+        build("mujoco", car, static_forces(car, 1201), 1e-3, 0.6).run(*np.split(start, 2))
 
 
 def test_steps_that_the_road_is_too_fast_for_are_told():
@@ -162,7 +165,7 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
     advised = min(each.step for each in errors_of(refusal.value.partial).values())
     for own in (table(60.0, 0.02 / np.ceil(0.02 / advised), 50.0), table(20.0, 2.5e-3, 200.0)):
         told = run(scene_of(own, "s.toml"), "mujoco", error=True)
-        assert max(each.share for each in errors_of(told).values()) < WARNED
+        assert max(each.share for each in errors_of(told).values()) < WARNED_SHARE
 
 
 def test_a_file_of_ones_own(tmp_path, measured):

@@ -8,9 +8,9 @@ import pytest
 
 from models.advice.choice.systems.hub_forces import computed_quantities
 from models.core.errors import InputError
-from models.core.scene_effects import legal, named_effects, with_effects, without
+from models.core.scene_effects import check_combination, named_effects, scene_without, with_effects
 from models.systems.hub_forces.comparison import planned_runs
-from models.systems.hub_forces.measurement import recorded
+from models.systems.hub_forces.measurement import recorded_measurement
 from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.scene import build
 from studies.command.asked import plan_of
@@ -34,8 +34,8 @@ def test_each_noise_leaves_alone_and_without_both_transducers_tell_the_truth():
     own = scene()
     with_noise = measure(own, "mujoco")
     assert with_noise.truth is not None
-    true, both = recorded(with_noise.truth, own.forces.frame, 2), (with_noise.forces, with_noise.angles)
-    left_out = (measure(without(own, *out), "mujoco") for out in (*((name,) for name in NOISES), NOISES))
+    true, both = recorded_measurement(with_noise.truth, own.forces.frame, 2), (with_noise.forces, with_noise.angles)
+    left_out = (measure(scene_without(own, *out), "mujoco") for out in (*((name,) for name in NOISES), NOISES))
     told = [(measurement.forces, measurement.angles) for measurement in left_out]
     same = [[np.array_equal(a.samples, b.samples) for a, b in zip(one, true, strict=True)] for one in (both, *told)]
     assert same == [[False, False], [False, True], [True, False], [True, True]]
@@ -43,7 +43,7 @@ def test_each_noise_leaves_alone_and_without_both_transducers_tell_the_truth():
 
 
 def test_what_is_stated_stays_without_noise():
-    quiet = without(scene(angles={"angle_deviation": 0.01}), *NOISES)
+    quiet = scene_without(scene(angles={"angle_deviation": 0.01}), *NOISES)
     assert quiet.angles.deviations == (0.01, 5e-3)  # the filter weighs by it, and needs some
     told = plan_of(quiet).describe(quiet)
     assert "  noise      none\n" in told and "absent     angle_noise, force_noise, held_forces, kalman_filter" in told
@@ -51,9 +51,9 @@ def test_what_is_stated_stays_without_noise():
 
 def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():
     held = scene(stabilise={"method": "kalman"})
-    assert without(held, "kalman_filter").stabilise.method == "none"
+    assert scene_without(held, "kalman_filter").stabilise.method == "none"
     assert with_effects(held, "prescribed_angles").stabilise.method == "prescribed"
-    assert without(with_effects(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
+    assert scene_without(with_effects(held, "prescribed_angles"), "prescribed_angles").stabilise.method == "none"
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_a_stabiliser_leaves_for_none_and_gives_way_to_the_other():
 )
 def test_what_cannot_be_together_is_told_with_the_remedy(there, told):
     with pytest.raises(InputError, match=told):
-        legal(there, scene())
+        check_combination(there, scene())
 
 
 @pytest.mark.parametrize("table", ["forces", "angles"])
@@ -89,7 +89,7 @@ def test_quantities_are_those_of_the_run_that_the_scene_holds():
     free, held = scene(), scene(stabilise={"method": "kalman"})
     paths = [
         computed_quantities(own, "mujoco").quantities["roll"].cases[0]
-        for own in (free, without(free, "angle_noise"), held, without(held, "angle_noise"))
+        for own in (free, scene_without(free, "angle_noise"), held, scene_without(held, "angle_noise"))
     ]
     assert np.array_equal(paths[0], paths[1])
     assert not np.array_equal(paths[0], paths[2]) and not np.array_equal(paths[2], paths[3])
@@ -102,7 +102,7 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
         raise AssertionError("was made")
 
     monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate", missing)
-    monkeypatch.setattr("models.systems.hub_forces.run.enforced", missing)
+    monkeypatch.setattr("models.systems.hub_forces.run.enforced_inputs", missing)
     measurement = measure(scene(), "mujoco")
     assert measurement.hub_inputs("none", 1e-3, 100).guide is None
     for method in ("kalman", "prescribed"):

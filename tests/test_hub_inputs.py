@@ -17,7 +17,7 @@ from models.systems.hub_forces.plan import check, describe
 from models.systems.hub_forces.run import measure, run
 from models.systems.hub_forces.scene import build
 from validation.absence.hub_forces import BARE_SCENE, write
-from validation.spatial.cars import r19, shaken, static
+from validation.spatial.cars import r19, random_wrenches, static_forces
 from validation.spatial.hub_inputs import SOLVER_TOLERANCE, centre_gap, instants_gap, path_gap, samples, settings
 
 ON_ROAD = {"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "road": {}, "run": {"duration": 0.04}}
@@ -129,7 +129,7 @@ def test_an_engine_is_not_asked_for_what_it_lacks():
 def shaken_rows() -> HubInputs:
     """Forces that change at every half step of ``settings``."""
     rows = 2 * settings().steps + 1
-    rest, one = static(r19(), rows), shaken(r19(), "hub", guide=False)
+    rest, one = static_forces(r19(), rows), random_wrenches(r19(), "hub", guide=False)
     return replace(rest, hubs=rest.hubs + np.arange(rows)[:, None] * (one.hubs[0] - rest.hubs[0]) * SOLVER_TOLERANCE)
 
 

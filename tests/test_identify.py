@@ -9,16 +9,16 @@ import pytest
 from models.core.errors import InputError
 from models.core.systems import load
 from models.core.tables import write_table
-from models.identification.bands import bands, error_model
+from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
-from models.identification.of_scene import parameter, problem_of
+from models.identification.of_scene import parameter_of_scene, problem_of
 from models.identification.problem import FitClock, Parameter, Problem, measured_channel
-from models.identification.uncertainty import profile, uncertainty
+from models.identification.uncertainty import likelihood_profile, uncertainty
 from models.measured.outliers import without_outliers
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
 from models.systems.wheelset import run as wheelset_run
-from studies.command.identify import identify, late_clock, lines
+from studies.command.identify import identification_lines, identify, late_clock
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 NOISE = {"yaw rate": 0.004, "lateral acceleration": 0.2, "side slip": 0.0008}
@@ -99,7 +99,7 @@ def test_noise_that_stays_widens_errors(scene: SingleTrackScene) -> None:
         coloured.append(replace(channel, values=channel.values + NOISE[channel.name] * slow))
     known = uncertainty(fit(replace(problem, channels=coloured)))
     assert np.all(known.deviations > 1.5 * white.deviations)
-    assert known.staying > 5.0 * white.staying
+    assert known.correlation_time > 5.0 * white.correlation_time
 
 
 def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
@@ -109,7 +109,7 @@ def test_what_data_do_not_determine_is_said(scene: SingleTrackScene) -> None:
     known = uncertainty(fit(problem_of(blind, measured(scene), keys)))
     error, direction = known.combinations()[-1]
     assert np.argmax(np.abs(direction)) == 2 or error > 1.0
-    assert not known.determined[2]
+    assert not known.is_determined[2]
 
 
 @pytest.mark.parametrize("late", [0.0, 0.6])
@@ -120,7 +120,7 @@ def test_a_clock_that_is_late_is_told(scene: SingleTrackScene, late: float) -> N
     write_table(Path(scene.folder) / "late.csv", {"time": ("s", TIMES), **columns})
     known = uncertainty(fit(problem_of(begun(scene), Path(scene.folder) / "late.csv", ["vehicle.yaw_inertia"])))
     assert late_clock(known) == pytest.approx(late, abs=0.1)  # the start has other tyres, which move the phase
-    assert any("the measurement's clock seems" in line for line in lines(known)) == (late > 0.0)
+    assert any("the measurement's clock seems" in line for line in identification_lines(known)) == (late > 0.0)
 
 
 def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
@@ -130,10 +130,10 @@ def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
     predicted = problem.predicted(known.fit.values)
     errors = [error_model(row - channel.values, row) for row, channel in zip(predicted, problem.channels, strict=True)]
     fresh = problem_of(begun(scene), measured(scene, 7), KEYS, low_pass=5.0)
-    answer = bands(fresh, known, errors)
-    assert np.all(answer.inside() > 0.9) and np.all(answer.inside() <= 0.995)
+    answer = error_bands(fresh, known, errors)
+    assert np.all(answer.share_inside() > 0.9) and np.all(answer.share_inside() <= 0.995)
     assert np.all(answer.width() < 2.5)
-    assert np.all(replace(answer, half_width=0.25 * answer.half_width).inside() < 0.7)
+    assert np.all(replace(answer, half_width=0.25 * answer.half_width).share_inside() < 0.7)
 
 
 def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
@@ -160,8 +160,8 @@ def test_profile_of_a_straight_problem_is_a_parabola() -> None:
     known = uncertainty(fit(Problem(model, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
     closed = np.linalg.inv(np.array([[400.0, times.sum()], [times.sum(), (times**2).sum()]])) * 0.01
     assert known.deviations == pytest.approx(np.sqrt(np.diag(closed)), rel=0.4)  # long-run scores scatter
-    rises = profile(known, 1)
-    assert rises.quadratic
+    rises = likelihood_profile(known, 1)
+    assert rises.is_quadratic
     assert rises.rise == pytest.approx(rises.parabola, rel=0.02)
 
 
@@ -189,7 +189,7 @@ def test_spikes_are_left_out(scene: SingleTrackScene) -> None:
 def test_parameters_are_refused(scene: SingleTrackScene, text: str, said: str) -> None:
     """Each with the key."""
     with pytest.raises(InputError, match=said) as caught:
-        parameter(scene, text)
+        parameter_of_scene(scene, text)
     assert text.partition("=")[0] in str(caught.value)
 
 

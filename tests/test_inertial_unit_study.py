@@ -8,20 +8,20 @@ import pytest
 from models.core.errors import InputError
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.angle_damage import damages
-from models.drift.score import CHANNELS, section_forces
+from models.drift.angle_damage import damage_at_angle_errors
+from models.drift.score import SECTION_FORCE_CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 
 SHORT = ["run.duration=10.0", "options.samples=100", "options.durations=[1.0, 5.0]", "options.sampling_rate=10"]
 
 
 def scene(*changes):
-    return load(SCENES / "inertial_unit.toml", [*SHORT, *changes])
+    return load(SCENES_FOLDER / "inertial_unit.toml", [*SHORT, *changes])
 
 
 def options(own):
@@ -65,7 +65,7 @@ def test_the_coarsest_grade_keeps_what_is_allowed(summary):
         assert at[grade] <= own.allowed_damage_error
         assert all(error > own.allowed_damage_error for other, error in at.items() if other > grade)
     impossible = own.model_copy(update={"allowed_damage_error": 1e-9})
-    assert set(study.cheapest(found["rows"], impossible).values()) == {None}
+    assert set(study.coarsest_sufficient_grade(found["rows"], impossible).values()) == {None}
     names = {path.name for path in folder.iterdir()}
     assert {"table.txt", "grades.png", "damage_of_an_angle.png", "mujoco.nc", "reference.nc"} == names
 
@@ -77,7 +77,7 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
     error = np.linspace(0.0, 0.03, len(pitch))
     wrong, true = section_forces(f3, f4, pitch + error), section_forces(f3, f4, pitch)
     found = study.damage_errors(study.log_damage_over_pitch_error(result, 0.1), error[None, ::100])[0]
-    ratio = np.array([pseudo_damage(wrong[name]) / pseudo_damage(true[name]) for name in CHANNELS])
+    ratio = np.array([pseudo_damage(wrong[name]) / pseudo_damage(true[name]) for name in SECTION_FORCE_CHANNELS])
     # f3x and f4x do 10 % and 115 % more damage; what is left falls as one over the number of runs
     assert 1 + found == pytest.approx(ratio, rel=0.01)
     assert ratio.max() > 2
@@ -85,10 +85,10 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
 
 def test_the_curve_between_its_nodes_is_a_count_of_damage():
     result = simulate(scene(), "reference")
-    curve, true = study.log_damage_over_pitch_error(result, 0.3), np.array(damages(result, 0.0))
+    curve, true = study.log_damage_over_pitch_error(result, 0.3), np.array(damage_at_angle_errors(result, 0.0))
     for angle in (-0.21, -0.004, 3e-4, 0.017, 0.12):
         # a spline of 41 nodes over a count that is smooth but for cycles that change their partner
-        assert np.exp(curve(angle)) == pytest.approx(np.array(damages(result, angle)) / true, rel=0.01)
+        assert np.exp(curve(angle)) == pytest.approx(np.array(damage_at_angle_errors(result, angle)) / true, rel=0.01)
     assert np.array_equal(curve(0.0), np.zeros(4))
 
 

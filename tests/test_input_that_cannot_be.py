@@ -150,9 +150,9 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     assert "falls" in json.loads(result.data.attrs["doubts"])[0] and "doubt" in result.data.attrs["status"]
     assert abs(result["z3"][-1]) > 80.0  # as the doubt says
     from models.systems.pitch_plane.plan import trust_line
-    from models.systems.pitch_plane.scene import assemble
+    from models.systems.pitch_plane.scene import assembly_of_scene
 
-    assert "mean of the wheel forces" in trust_line(assemble(own))[0]
+    assert "mean of the wheel forces" in trust_line(assembly_of_scene(own))[0]
     accepted = scene(tmp_path, 0.95 * true()[0], 'accept = ["weight"]\n')
     assert not findings_of(accepted)
 

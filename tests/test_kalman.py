@@ -7,24 +7,24 @@ from scipy.linalg import expm
 from models.core.errors import InputError, RunFailed
 from models.core.tables import NEWTONS
 from models.core.time_series import read_time_series, write_time_series
-from models.drift.innovations import LEVEL, consistency
+from models.drift.innovations import FALSE_ALARM_SHARE, consistency
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane import pitch_filter
 from models.systems.pitch_plane.pitch_filter import (
-    INERTIA,
-    KEPT,
+    INERTIA_SHARE,
+    KEPT_STATES,
     PITCH,
-    RATE,
-    RELATIVE,
+    PITCH_RATE,
+    RELATIVE_STATES,
     Measurement,
     PitchStep,
     estimate,
 )
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 
 PERIOD, DURATION = 5e-3, 2.0
@@ -59,7 +59,9 @@ def scene(
 
 def free(folder, **own):
     """States of the reference at the samples."""
-    return build("reference", assemble(scene(folder, **own)), Settings("RK4", 1e-3, DURATION)).run().states[::5]
+    return (
+        build("reference", assembly_of_scene(scene(folder, **own)), Settings("RK4", 1e-3, DURATION)).run().states[::5]
+    )
 
 
 def drawn(folder, **own):
@@ -74,13 +76,13 @@ def angles(folder):
 def matrices(assembly):
     p, pushes = assembly.parameters, np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE @ first_order(linearised(assembly.vehicle))[:, KEPT], RELATIVE @ pushes
+    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, KEPT_STATES], RELATIVE_STATES @ pushes
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])
 def test_the_step_of_the_linear_vehicle_is_the_matrix_exponential(folder, interpolation, monkeypatch):
-    monkeypatch.setattr(pitch_filter, "REACH", 0.02)  # substeps in which Runge-Kutta errs by 1e-8
-    assembly = assemble(scene(folder, geometry="linear", interpolation=interpolation))
+    monkeypatch.setattr(pitch_filter, "LONGEST_SUBSTEP", 0.02)  # substeps in which Runge-Kutta errs by 1e-8
+    assembly = assembly_of_scene(scene(folder, geometry="linear", interpolation=interpolation))
     a, b = matrices(assembly)
     h = 2e-3
     block = np.zeros((10, 10))
@@ -98,23 +100,23 @@ def test_the_step_of_the_linear_vehicle_is_the_matrix_exponential(folder, interp
 @pytest.mark.parametrize("frame", ["inertial", "body"])
 def test_steps_follow_the_reference_and_so_do_their_derivatives_to_the_inertia(folder, frame):
     """Run as one chain from the start, state and product of the steps' derivatives."""
-    own = assemble(scene(folder, frame=frame))
+    own = assembly_of_scene(scene(folder, frame=frame))
     step, count = PitchStep(own, PERIOD, 100), 100
-    x, slope = np.append(RELATIVE @ own.initial, 0.0), np.eye(7)
+    x, slope = np.append(RELATIVE_STATES @ own.initial, 0.0), np.eye(7)
     for i in range(count):
         x, transition, _, _ = step.advance(x, i)
         slope = transition @ slope
     run = free(folder, frame=frame)[count]
-    np.testing.assert_allclose(x[:6], RELATIVE @ run, atol=1e-10)  # the same Runge-Kutta at the same 1 ms
+    np.testing.assert_allclose(x[:6], RELATIVE_STATES @ run, atol=1e-10)  # the same Runge-Kutta at the same 1 ms
     more, less = (free(folder, frame=frame, I=own.parameters.I / (1 + d))[count] for d in (1e-4, -1e-4))
-    found = RELATIVE @ (more - less) / 2e-4
+    found = RELATIVE_STATES @ (more - less) / 2e-4
     np.testing.assert_allclose(slope[:6, 6], found, rtol=1e-5, atol=1e-7)
 
 
 def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder, monkeypatch):
     """Linear vehicle: each sample's response at the end, from the reference itself, squared and summed."""
-    monkeypatch.setattr(pitch_filter, "KNOWN", 0.0)
-    own = assemble(scene(folder, duration=0.05, geometry="linear"))
+    monkeypatch.setattr(pitch_filter, "KNOWN_DEVIATION", 0.0)
+    own = assembly_of_scene(scene(folder, duration=0.05, geometry="linear"))
     found = estimate(own, Measurement(np.full((11, 1), np.nan), PERIOD, (PITCH,), (ANGLE,)), 16.0)
     base, total = own.input.values, np.zeros((6, 6))
     settings = Settings("RK4", 1e-3, 0.05)
@@ -122,7 +124,7 @@ def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder,
     for i in range(11):
         for wheel in range(2):
             own.input.values[i, wheel] += 1e3
-            response = RELATIVE @ (build("reference", own, settings).run().states[-1] - at_rest) * 16.0 / 1e3
+            response = RELATIVE_STATES @ (build("reference", own, settings).run().states[-1] - at_rest) * 16.0 / 1e3
             own.input.values[i, wheel] -= 1e3
             total += np.outer(response, response)
     assert np.array_equal(own.input.values, base)
@@ -133,7 +135,7 @@ def test_without_measurement_the_covariance_is_that_of_all_force_samples(folder,
 
 def test_the_smoother_is_the_conditional_mean_of_everything(folder):
     """Linear vehicle, held forces: the joint Gaussian of all states, conditioned on all measurements at once."""
-    n, own = 12, assemble(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
+    n, own = 12, assembly_of_scene(scene(folder, duration=0.06, geometry="linear", interpolation="held"))
     measured = Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,))
     step = PitchStep(own, PERIOD, n)
     mean, start = pitch_filter._start(own, 0.05, 0.0)
@@ -159,13 +161,13 @@ def test_the_smoother_is_the_conditional_mean_of_everything(folder):
 
 
 def test_a_wrong_inertia_is_learnt(folder):
-    right = assemble(scene(folder)).parameters.I
-    wrong = assemble(scene(folder, I=0.95 * right))
+    right = assembly_of_scene(scene(folder)).parameters.I
+    wrong = assembly_of_scene(scene(folder, I=0.95 * right))
     found = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0, inertia_deviation=0.05)
-    share, sure = found.states[-1, INERTIA], np.sqrt(found.errors()[-1, INERTIA, INERTIA])
+    share, sure = found.states[-1, INERTIA_SHARE], np.sqrt(found.errors()[-1, INERTIA_SHARE, INERTIA_SHARE])
     assert sure < 0.01 and abs(share + 0.05) < 4 * sure  # 1/I of the model is 1/0.95 of the true one
     trusted = estimate(wrong, Measurement(angles(folder), PERIOD, (PITCH,), (ANGLE,)), 16.0)
-    assert abs(trusted.states[-1, INERTIA]) < 1e-6
+    assert abs(trusted.states[-1, INERTIA_SHARE]) < 1e-6
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])
@@ -213,24 +215,24 @@ def test_angle_and_rate_together_are_surer_than_either(folder):
     states = free(folder)
     noise = np.random.default_rng(2).standard_normal((len(states), 2)) * [ANGLE, 0.05]
     values = states[:, [3, 7]] + noise
-    own, sure = assemble(scene(folder)), {}
-    for columns in ((PITCH,), (RATE,), (PITCH, RATE)):
+    own, sure = assembly_of_scene(scene(folder)), {}
+    for columns in ((PITCH,), (PITCH_RATE,), (PITCH, PITCH_RATE)):
         chosen = [0 if column == PITCH else 1 for column in columns]
         deviations = tuple((ANGLE, 0.05)[i] for i in chosen)
         found = estimate(own, Measurement(values[:, chosen], PERIOD, columns, deviations), 16.0)
         sure[columns] = np.sqrt(found.errors()[-1, PITCH, PITCH])
         assert abs(found.states[-1, PITCH] - states[-1, 3]) < 5 * sure[columns]
-    assert sure[PITCH, RATE] < min(sure[PITCH,], sure[RATE,])
+    assert sure[PITCH, PITCH_RATE] < min(sure[PITCH,], sure[PITCH_RATE,])
 
 
 def test_a_measurement_at_its_own_rate_lies_at_its_own_times(folder):
     states = free(folder)
     slow = Measurement(states[::4, [3]], 4 * PERIOD, (PITCH,), (ANGLE,))
-    found = estimate(assemble(scene(folder)), slow, 16.0)
-    assert found.used.sum() == len(slow.values) and (found.used[::4] == 1).all()
+    found = estimate(assembly_of_scene(scene(folder)), slow, 16.0)
+    assert found.used_values.sum() == len(slow.values) and (found.used_values[::4] == 1).all()
     np.testing.assert_allclose(found.states[:, PITCH], states[:, 3], atol=1e-9)  # all data are true
-    fine = build("reference", assemble(scene(folder)), Settings("RK4", 1e-3, DURATION)).run().states
-    fast = estimate(assemble(scene(folder)), Measurement(fine[:, [3]], 1e-3, (PITCH,), (ANGLE,)), 16.0)
+    fine = build("reference", assembly_of_scene(scene(folder)), Settings("RK4", 1e-3, DURATION)).run().states
+    fast = estimate(assembly_of_scene(scene(folder)), Measurement(fine[:, [3]], 1e-3, (PITCH,), (ANGLE,)), 16.0)
     np.testing.assert_allclose(fast.states[:, PITCH], fine[:, 3], atol=1e-9)
 
 
@@ -257,8 +259,8 @@ def test_one_estimate_serves_a_check_and_all_engines(folder, monkeypatch):
 
     monkeypatch.setattr(pitch_filter, "estimate", counted)
     for _ in range(3):
-        assemble(scene(folder, drawn(folder)))
-    assemble(scene(folder, drawn(folder, force_deviation=17.0)))
+        assembly_of_scene(scene(folder, drawn(folder)))
+    assembly_of_scene(scene(folder, drawn(folder, force_deviation=17.0)))
     assert len(calls) == 2
 
 
@@ -282,13 +284,13 @@ def test_bad_input_gets_one_clear_message(folder, change, words):
     own = drawn(folder, **change)
     own["kalman_filter"] = {key: value for key, value in own["kalman_filter"].items() if value is not None}
     with pytest.raises(InputError, match=words):
-        assemble(scene(folder, own))
+        assembly_of_scene(scene(folder, own))
 
 
 @pytest.mark.parametrize("other", [{"pitch_spring": {"stiffness": 1.0}}, {"prescribed_pitch": {"file": "p.csv"}}])
 def test_it_stands_alone_among_the_stabilisers(folder, other):
     with pytest.raises(InputError, match="cannot stand beside"):
-        assemble(scene(folder, drawn(folder) | other))
+        assembly_of_scene(scene(folder, drawn(folder) | other))
 
 
 @pytest.mark.parametrize("wrong", ["pitch_deviation", "sign"])
@@ -298,14 +300,14 @@ def test_a_measurement_that_contradicts_the_forces_is_refused(folder, wrong):
         write_time_series(folder / "p.csv", {"pitch": ("rad", -angles(folder)[:, 0])}, PERIOD)
     own = {"pitch_deviation": ANGLE / 10} if wrong == "pitch_deviation" else {}
     with pytest.raises(InputError, match="contradicts forces and model"):
-        assemble(scene(folder, drawn(folder, **own)))
+        assembly_of_scene(scene(folder, drawn(folder, **own)))
 
 
 def test_right_innovations_are_called_wrong_as_seldom_as_stated():
     rng, runs = np.random.default_rng(7), 3000
     wrong = sum(not consistency(rng.standard_normal((400, 2)), ("pitch", "rate")).consistent for _ in range(runs))
     # 3 of 3000 are expected; the tests of a run hang together a little; Poisson: more than 10 are seen once in 3000
-    assert wrong <= 10 and LEVEL == 1e-3
+    assert wrong <= 10 and FALSE_ALARM_SHARE == 1e-3
     gaps = rng.standard_normal((4000, 1))
     gaps[rng.random(4000) < 0.3] = np.nan
     assert consistency(gaps, ("pitch",)).consistent
@@ -337,7 +339,7 @@ def measured_pitch(folder, bias=0.0):
 
 def test_a_filter_that_contradicts_its_measurement_is_named_by_plan_and_result(folder):
     measured_pitch(folder)
-    assert assemble(scene(folder, drawn(folder))).doubts == ()
+    assert assembly_of_scene(scene(folder, drawn(folder))).doubts == ()
     assert "in doubt" not in simulate(scene(folder, drawn(folder)), "reference").data.attrs["status"]
 
 
@@ -345,7 +347,7 @@ def test_a_biased_angle_and_wrong_deviations_are_named(folder):
     measured_pitch(folder, bias=4 * ANGLE)
     for changes in ({}, {"pitch_deviation": 2 * ANGLE}):
         own = scene(folder, drawn(folder, **changes))
-        (text,) = assemble(own).doubts
+        (text,) = assembly_of_scene(own).doubts
         assert "the filter contradicts p.csv" in text and "doubt      the filter" in describe(own)
         result = simulate(own, "reference")
         assert "in doubt" in result.data.attrs["status"] and "contradicts" in result.data.attrs["doubts"]
@@ -356,4 +358,4 @@ def test_a_mark_for_no_value_is_told_with_column_and_time(folder):
     forces[100, 1] = 9.9e34
     write_time_series(folder / "f.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
     with pytest.raises(InputError, match=r"column 'rear' at 0.5 s = 9.9e\+34: is an exporter's mark for no value"):
-        assemble(scene(folder))
+        assembly_of_scene(scene(folder))

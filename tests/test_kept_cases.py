@@ -8,7 +8,7 @@ import pytest
 
 from models.core.errors import InputError
 from validation.common.rows import Observed
-from validation.run import Cases, measured
+from validation.run import Cases, measured_cases
 
 NAMES = ("a_case", "bad_case", "one_more")
 
@@ -40,7 +40,7 @@ def go(folder, quick=True):
     (folder / "data").mkdir(exist_ok=True)
     told = []
     with ThreadPoolExecutor(2) as pool:
-        return measured(Cases(NAMES, quick, folder), pool, told.append), told
+        return measured_cases(Cases(NAMES, quick, folder), pool, told.append), told
 
 
 def test_a_report_goes_on_with_the_cases_that_have_not_ended(cases, tmp_path):

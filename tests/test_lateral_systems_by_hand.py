@@ -11,10 +11,10 @@ from models.bicycle.four_bodies import Ride
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.bicycle.whipple import load_bicycle
 from models.core.systems import of_table
-from models.rail.flange_climbing import bound_shares, nadal
-from models.rail.wheelset import CHOSEN
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.rail.flange_climbing import bound_shares, nadal_limit
+from models.rail.wheelset import CHOSEN_WHEELSET
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.systems import run
 from models.systems.ride.of_scene import excitation_of
 from models.vehicles.spatial_linear import linearise, wheels
@@ -75,15 +75,17 @@ def test_a_wheelset_begins_where_its_scene_says_and_its_rails_carry_the_load(eng
     moving = {"duration": 0.01, "step": 5e-4, "displacement": 1.5e-4}
     result = run(of_table({**table, "run": moving}, "s.toml", Path()), engine, speed=20.5)
     assert result["y"][0] == pytest.approx(1.5e-4, rel=1e-12) and result["yaw"][0] == 0.0
-    assert result["spin"][0] == pytest.approx(-20.5 / CHOSEN.radius, rel=1e-4)
-    assert result["normal"][0].sum() * math.cos(CHOSEN.conicity) == pytest.approx(CHOSEN.load, rel=3e-3)
+    assert result["spin"][0] == pytest.approx(-20.5 / CHOSEN_WHEELSET.radius, rel=1e-4)
+    assert result["normal"][0].sum() * math.cos(CHOSEN_WHEELSET.conicity) == pytest.approx(
+        CHOSEN_WHEELSET.load, rel=3e-3
+    )
     assert result.times == pytest.approx(5e-4 * np.arange(21), abs=1e-12)
 
 
 @pytest.mark.grounds("published")
 def test_nadal_s_limit_and_shares_of_a_bound():
     """70 degrees and a friction of 0.3: (tan - mu) / (1 + mu tan) = 1.34. Source: M. J. Nadal (1908)."""
-    assert nadal(0.3, math.radians(70.0)) == pytest.approx((2.7474774 - 0.3) / (1.0 + 0.3 * 2.7474774), rel=1e-7)
+    assert nadal_limit(0.3, math.radians(70.0)) == pytest.approx((2.7474774 - 0.3) / (1.0 + 0.3 * 2.7474774), rel=1e-7)
     shares = bound_shares(np.array([-3.0, 0.0, 2.0]), np.array([4.0, 0.0, 0.0]))
     assert shares.tolist() == [0.75, 0.0, math.inf]
 
@@ -97,7 +99,7 @@ def test_a_ride_has_the_variances_of_the_direct_route(engine):
     result, vehicle = run(scene, engine), load_vehicle("r19_ride")
     road = excitation_of(scene, wheels(vehicle))
     for row, speed in enumerate((12.5, 25.5)):
-        direct = np.sqrt(stationary(excited(linearise(vehicle, speed), road, speed)).variance)
+        direct = np.sqrt(stationary_covariance(vehicle_with_road(linearise(vehicle, speed), road, speed)).variance)
         names = [output.name for output in linearise(vehicle, speed).outputs]
         found = dict(zip(result.data["output"].values.tolist(), result["deviation"][0, row], strict=True))
         told = direct > 1e-9 * direct.max()

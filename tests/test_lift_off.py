@@ -7,7 +7,7 @@ import pytest
 
 from models.advice.choice.systems.ride import opened
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import without
+from models.core.scene_effects import scene_without
 from models.engines import reference
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
@@ -23,9 +23,9 @@ from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.hub_forces.scene import build as build_hubs
 from models.systems.pitch_plane.effects import lift_off
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.ride.nonlinear import ridden
+from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import check_linear, excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
 from models.vehicles import pitch_plane_equations
@@ -34,8 +34,8 @@ from models.vehicles.spatial_linear import preloads, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies import ride_nonlinear
 from validation.common import checks
-from validation.common.bounces import Bounces, energy
-from validation.common.scenes import gap
+from validation.common.bounces import Bounces, bounce_energy
+from validation.common.scenes import largest_difference
 
 ENGINES = ("reference", "exudyn", "mujoco")
 ROAD = {"source": "study", "speed": 20.0}
@@ -68,10 +68,12 @@ def test_three_implementations_agree_and_never_pull(effects, geometry):
     own = scene(effects, geometry=geometry, start=DROP)
     found = {engine: simulate(own, engine) for engine in ENGINES}
     for engine in ENGINES[1:]:
-        assert gap(found[engine], found["reference"]) < 1e-12  # the order of additions is all that differs
+        assert (
+            largest_difference(found[engine], found["reference"]) < 1e-12
+        )  # the order of additions is all that differs
         settings = settings_of(own, engine)
         # random states lie half a metre to both sides: tyres in the air, pressed and hit
-        assert checks.acceleration_gap(checks.engine(engine), assemble(own), settings) < 1e-12
+        assert checks.acceleration_gap(checks.engine(engine), assembly_of_scene(own), settings) < 1e-12
     pressed = forces(found["reference"])
     assert pressed.min() == 0.0 and 0.05 < (pressed == 0.0).mean() < 0.5
 
@@ -79,7 +81,7 @@ def test_three_implementations_agree_and_never_pull(effects, geometry):
 @pytest.mark.grounds("closed form")
 def test_the_law_at_hand_made_states():
     """In the air, pressed, released faster than the spring follows, hit faster than it gives way."""
-    p = assemble(scene()).parameters
+    p = assembly_of_scene(scene()).parameters
     p = p.model_copy(update={"k1": 1e5, "d1": 400.0})
     laws = {(-0.01, 9.0): 0.0, (0.02, 1.0): 2400.0, (0.02, -6.0): 0.0, (0.02, -4.0): 400.0, (0.001, 3.0): 200.0}
     for (e, rate), wanted in laws.items():
@@ -94,14 +96,14 @@ def test_a_wheel_that_never_lifts_has_the_paper_s_tyre():
     """A smooth road, whose loads stay far from zero: the same to rounding with and without the effect."""
     own = scene({"road": {"source": "study", "speed": 20.0, "gd": 1e-6}})
     for engine in ENGINES:
-        with_it, linear = simulate(own, engine), simulate(without(own, "lift_off"), engine)
-        assert forces(linear).min() > 500.0 and gap(with_it, linear) < 1e-11
+        with_it, linear = simulate(own, engine), simulate(scene_without(own, "lift_off"), engine)
+        assert forces(linear).min() > 500.0 and largest_difference(with_it, linear) < 1e-11
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_free_fall_until_the_wheels_touch(engine):
     own = scene(start={"z1": -1.0, "z2": -1.0, "z3": -1.0}, duration=0.3)
-    run, p = simulate(own, engine), assemble(own).parameters
+    run, p = simulate(own, engine), assembly_of_scene(own).parameters
     masses = np.array([p.m1, p.m2, p.m3])
     centre = run.states[:, :3] @ masses / masses.sum()
     assert forces(run).max() == 0.0
@@ -112,7 +114,7 @@ def test_free_fall_until_the_wheels_touch(engine):
 def test_a_wheel_alone_bounces_by_the_closed_form(engine):
     """Cut off its chassis it falls, swings once about its static depth on the tyre, and flies again, without end."""
     height, k, m, g = 0.05, 4e4, 25.0, 9.81
-    base = assemble(scene())
+    base = assembly_of_scene(scene())
     p = base.parameters.model_copy(update={"k1": k, "m1": m, "d1": 0.0, "k3": 0.0, "k4": 0.0, "d3": 0.0, "d4": 0.0})
     alone = lift_off.extend(replace(base, parameters=p, vehicle=describe(p), initial=-height * np.eye(8)[0]), None)
     run = build(engine, alone, Settings(INTEGRATORS[engine], 1e-4, 0.5)).run()
@@ -130,7 +132,7 @@ def test_a_wheel_alone_bounces_by_the_closed_form(engine):
 )
 def test_the_exact_path_piece_by_piece(override):
     own = scene(geometry="linear", start=DROP, duration=1.0, step=1e-4, **override)
-    assembly = assemble(own)
+    assembly = assembly_of_scene(own)
     exact = Bounces(assembly, 1e-4).path(assembly.initial, 10_000)
     tight = simulate(own, "reference", Settings("DOP853", 1e-4, 1.0, 1e-11))
     assert np.abs(tight.states - exact).max() < 1e-6  # its rows are interpolated, across corners, too
@@ -140,7 +142,7 @@ def test_the_exact_path_piece_by_piece(override):
 
 def test_the_error_falls_with_the_square_of_the_step():
     own = scene(geometry="linear", start=DROP)
-    assembly, steps = assemble(own), 1e-3 / 2.0 ** np.arange(6)
+    assembly, steps = assembly_of_scene(own), 1e-3 / 2.0 ** np.arange(6)
     exact = Bounces(assembly, 1e-3).path(assembly.initial, 1000)
     errors = []
     for step in steps:
@@ -161,14 +163,14 @@ FIRST_ORDER = [
 @pytest.mark.parametrize(("engine", "name"), FIRST_ORDER)
 def test_methods_of_first_order_run_where_tyres_lift(engine, name):
     """On a rough road their errors fall with the step; steps that jump over landings of stiff tyres are told."""
-    assembly = assemble(scene({"road": ROAD}, duration=1.0))
+    assembly = assembly_of_scene(scene({"road": ROAD}, duration=1.0))
     exact = build("reference", assembly, Settings("RK4", 5e-5, 1.0)).run().states
     errors = []
     for step in (1e-3, 2.5e-4):
         states = build(engine, assembly, Settings(name, step, 1.0)).run().states
         errors.append(np.abs(states - exact[:: round(step / 5e-5)])[:, 4:].max())
     assert 3.0 < errors[0] / errors[1] < 5.0  # a quarter of the step
-    stiff = assemble(scene(start=DROP, k1=2e7, k2=2e7, d1=0.0, d2=0.0))
+    stiff = assembly_of_scene(scene(start=DROP, k1=2e7, k2=2e7, d1=0.0, d2=0.0))
     with pytest.raises((RunFailed, InputError), match=r"goes unseen between them|stability limit"):
         build(engine, stiff, Settings(name, 2e-3, 2.0)).run()
 
@@ -180,8 +182,8 @@ def test_a_bouncing_vehicle_gains_no_energy(engine, geometry):
     damped = scene(geometry=geometry, start=DROP, step=1e-4, duration=1.5, d1=800.0, d3=0.0, d4=0.0)
     for own in (undamped, damped):
         states = simulate(own, engine).states
-        of = energy(assemble(own), states)
-        size = np.ptp(energy(assemble(own), states * np.array([0, 0, 0, 0, 1, 1, 1, 1])))  # of motion
+        of = bounce_energy(assembly_of_scene(own), states)
+        size = np.ptp(bounce_energy(assembly_of_scene(own), states * np.array([0, 0, 0, 0, 1, 1, 1, 1])))  # of motion
         assert (of - np.minimum.accumulate(of)).max() < 1e-4 * size  # the error of the step
         if own is undamped:
             assert np.abs(of - of[0]).max() < 1e-4 * size
@@ -195,7 +197,7 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
         lambda y, u, p: pitch_plane_equations.tyres(y, u, p),
         lambda y, u, p: tuple(max(f, 0.0) for f in pitch_plane_equations.tyres(y, u, p)),
     ):
-        assembly = assemble(own)
+        assembly = assembly_of_scene(own)
         model = build("reference", assembly, settings_of(own, "reference"))
         dy = np.empty(8)
 
@@ -211,7 +213,7 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
         right = np.array(
             [build("exudyn", assembly, settings_of(own, "exudyn")).acceleration(1.0, *np.split(y, 2)) for y in states]
         )
-        assert checks.relative(found, right) > 1e-3
+        assert checks.relative_difference(found, right) > 1e-3
     assert forces(truth).min() == 0.0
 
 
@@ -220,7 +222,7 @@ def test_what_cannot_be_is_told_with_the_remedy(tmp_path):
 
     write_time_series(tmp_path / "f.csv", {"front": ("N", np.full(9, 4e3)), "rear": ("N", np.full(9, 4e3))}, 1e-3)
     with pytest.raises(InputError, match="lift_off: cannot stand beside 'wheel_forces', there is no tyre"):
-        assemble(
+        assembly_of_scene(
             build_scene(
                 {
                     "title": "t",
@@ -238,8 +240,8 @@ def test_what_cannot_be_is_told_with_the_remedy(tmp_path):
 def test_absent_means_absent():
     plain = build_scene({"title": "t", "run": {"duration": 0.01}, "effects": {"road": ROAD}})
     for engine in ENGINES:
-        model = build(engine, assemble(plain), settings_of(plain, engine))
-        more = build(engine, assemble(scene({"road": ROAD}, duration=0.01)), settings_of(plain, engine)).plan()
+        model = build(engine, assembly_of_scene(plain), settings_of(plain, engine))
+        more = build(engine, assembly_of_scene(scene({"road": ROAD}, duration=0.01)), settings_of(plain, engine)).plan()
         counts = model.plan()
         assert counts["callbacks"] == {"reference": 0, "exudyn": 4, "mujoco": 1}[engine]
         assert more["callbacks"] == {"reference": 0, "exudyn": 2, "mujoco": 1}[engine]
@@ -280,14 +282,14 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     own = ride_scene("quarter_car_nonlinear")
     vehicle = vehicle_of(own)
     road = road_path(excitation_of(own, wheels(vehicle)), 20.0, 5e-4)
-    runs = [ridden(engine, vehicle, road, 2.0, seed=2) for engine in ENGINES[1:]]
+    runs = [drive_over_road(engine, vehicle, road, 2.0, seed=2) for engine in ENGINES[1:]]
     assert np.abs(runs[0].run.positions - runs[1].run.positions).max() < 1e-12
     load = preloads(vehicle).tyres[vehicle.tyres[0].name]
     force = runs[0].of("tyre force front left")
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
     march = CopiesMarch(vehicle, 20.0, road.step, 1)
     march.states = np.zeros((2 * len(vehicle.coordinates()), 1))  # the engines begin at rest in the design position
-    march.over(road.table(runs[0].run.counts["steps"], 2)[:, :, None], 0)
+    march.march_over(road.table(runs[0].run.counts["steps"], 2)[:, :, None], 0)
     # a quarter car goes up and down alone, so that small motion is all that it has
     assert np.abs(march.states[:, 0] - np.concatenate([runs[1].run.positions[-1], runs[1].run.rates[-1]])).max() < 1e-11
 
@@ -328,7 +330,7 @@ def test_the_answer_of_a_ride_that_lifts_is_that_of_its_copies(tmp_path):
 def test_a_choice_of_effects_runs_in_time_and_may_leave_it_out():
     whole = opened(ride_scene("half_car", options={"copies": 12, "lasting": 1.0}))
     assert "lift_off" in whole.named
-    pace = whole.paces[0]
+    pace = whole.steps_at_speeds[0]
     assert whole.vehicle(pace).lifts and not whole.without(["lift_off"]).vehicle(pace).lifts
 
 

@@ -7,8 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.finding import Finding, gathered, queries
-from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
+from models.core.finding import Finding, findings_as_dicts, merged_findings
+from models.measured.checks import (
+    check,
+    clipped,
+    drift,
+    findings_of_all_checks,
+    gaps,
+    gravity,
+    noise,
+    spikes,
+    turning,
+    weight,
+)
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import SensorResponse
 from models.measured.checks.spectra import windowed_means
@@ -18,11 +29,11 @@ from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal, TransducerPlace
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
-from models.systems.measured.consequences import CORRECTIONS, Consequence, consequence_texts
+from models.systems.measured.consequences import CORRECTION_OF_CHECK, Consequence, consequence_texts
 from models.systems.measured.inputs import Inputs
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import filter_doubts
-from models.systems.measured.virtual import VirtualMeasurement, recording
+from models.systems.measured.virtual import VirtualMeasurement, recording_of_samples
 from models.vehicles.cut_vehicle import rigid
 from validation.cases import measured_checks as case
 from validation.measured import planted as bench
@@ -77,7 +88,7 @@ def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_pat
 def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
     assert all(
         row.status == "passed"
-        for row in case._rows(fault, bench.planted(ridden, tmp_path, fault.spoil, **fault.faults))
+        for row in case._rows(fault, bench.planted_findings(ridden, tmp_path, fault.spoil, **fault.faults))
     )
 
 
@@ -101,7 +112,7 @@ def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, t
 def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     """Hubs as a whole were looked for, and a sign, or a delay, that would not have helped was named instead."""
     samples = ridden.samples(Faults(noise=bench.NOISE), 5)
-    one, other = bench.columns(ridden, *pair)
+    one, other = bench.column_numbers(ridden, *pair)
     samples[:, [one, other]] = samples[:, [other, one]]
     found = bench.errors_and_doubts(ridden, samples, tmp_path)
     assert [(f.check, set(f.signals)) for f in found if f.check in ("exchanged", "sign", "shift", "swapped")] == [
@@ -110,23 +121,23 @@ def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     (named,) = (f for f in found if f.check == "exchanged")
     recorded = {s: np.array([i]) for i, s in enumerate(ridden.signals)}
     signals = [s for s in ridden.signals if s.name in pair]
-    right = CORRECTIONS["exchanged"](named, signals, recorded, ridden.period)
+    right = CORRECTION_OF_CHECK["exchanged"](named, signals, recorded, ridden.period)
     assert [int(right[s][0]) for s in signals] == [int(recorded[s][0]) for s in reversed(signals)]
 
 
 def test_an_angle_and_a_rate_of_different_axes_have_no_sign_to_turn(ridden, tmp_path):
     """Their ratio is chance: the sign of one was called wrong, and the run stopped with a remedy that does not help."""
     samples = ridden.samples(Faults(noise=bench.NOISE), 5)
-    one, other = bench.columns(ridden, "roll", "pitch")
+    one, other = bench.column_numbers(ridden, "roll", "pitch")
     samples[:, [one, other]] = samples[:, [other, one]]
-    own = recording(ridden, samples, tmp_path / "a.columns")
+    own = recording_of_samples(ridden, samples, tmp_path / "a.columns")
     for vehicle in (ridden.vehicle, None):
         found = [f for f in turning.check(Evidence(own, vehicle)) if f.weight != "note"]
         assert all(f.weight == "doubt" and "is not the derivative" in f.text for f in found)
 
 
 def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_path):
-    own = recording(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path / "a.columns")
+    own = recording_of_samples(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path / "a.columns")
     notes = [f.text for f in check(own, ridden.vehicle) if f.check == "exchanged"]
     assert len(notes) == 1 and "fl_my with fr_my" in notes[0] and "fl_fz with fr_fz" not in notes[0]
 
@@ -134,19 +145,19 @@ def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_pat
 @pytest.mark.parametrize("count, period", [(200, 2e-6), (1000, 2.0), (110, 1e-3), (100, 5e-4), (300, 1e-3)])
 def test_recordings_with_no_line_or_few_in_the_band_of_the_motion(ridden, tmp_path, count, period):
     """Times of another unit, and short ones: the spectra had no line, which ended in a traceback."""
-    own = recording(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
+    own = recording_of_samples(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
     check(replace(own, period=period), ridden.vehicle)
 
 
 def test_many_findings_of_one_kind_are_one_line_with_the_worst():
     gap = [Finding("gaps", "doubt", f"c{i}", f"c{i} lacks {i} s.", float(i), "s", (f"c{i}",)) for i in range(20)]
     others = [Finding("sign", "error", "x", "turn it."), Finding("gaps", "note", "", "looked at.")]
-    assert [f.text for f in gathered(others + gap)] == [
+    assert [f.text for f in merged_findings(others + gap)] == [
         "turn it.",
         "looked at.",
         "'gaps' at 20 channels, the worst: c19 lacks 19 s.",
     ]
-    assert gathered(gap[:3]) == gap[:3] and len(queries(gap)) == 20
+    assert merged_findings(gap[:3]) == gap[:3] and len(findings_as_dicts(gap)) == 20
     effects = [Consequence(one, "s F", 1e-3 * one.size, 1.0) for one in gap]
     assert len(consequence_texts(effects[:3])) == 3 and consequence_texts(effects) == [
         f"{effects[19]}, the worst of 20"
@@ -155,23 +166,25 @@ def test_many_findings_of_one_kind_are_one_line_with_the_worst():
 
 def test_the_slope_of_delays_and_its_error_by_their_scatter():
     times, late = np.arange(5.0), 2e-3 * np.arange(5.0) + 1e-3 * np.array([1.0, -2.0, 0.0, 2.0, -1.0])
-    slope, error = drift._slope(times, late, np.full(5, 1e-6))
+    slope, error = drift._slope_of_delays(times, late, np.full(5, 1e-6))
     line, covariance = np.polyfit(times, late, 1, cov=True)
     assert (slope, error) == pytest.approx((line[0], covariance[0, 0] ** 0.5))
-    assert drift._slope(times, 2e-3 * times, np.full(5, 1e-3))[1] == pytest.approx(1e-3 / np.sqrt(10))
+    assert drift._slope_of_delays(times, 2e-3 * times, np.full(5, 1e-3))[1] == pytest.approx(1e-3 / np.sqrt(10))
 
 
 @pytest.mark.full
 def test_a_clock_that_is_fast_is_named_and_nothing_else(tmp_path):
-    (found,) = (one for one in bench.drifting(bench.measurement(), -5e-4, tmp_path) if one.check != "noise")
+    (found,) = (one for one in bench.drifting_findings(bench.measurement(), -5e-4, tmp_path) if one.check != "noise")
     assert found.check == "drift" and found.place == "inertial" and found.size == pytest.approx(-5e-4, rel=0.2)
-    assert not bench.drifting(bench.measurement(), 0.0, tmp_path)  # no noise is filtered by interpolation, either
+    assert not bench.drifting_findings(
+        bench.measurement(), 0.0, tmp_path
+    )  # no noise is filtered by interpolation, either
 
 
 def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
     values = [ridden.samples(Faults(noise=bench.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
     clean, off = (
-        weight.moments(Evidence(recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
+        weight.mean_hub_moments(Evidence(recording_of_samples(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
         for i, own in enumerate(values)
     )
     arm = rigid(ridden.vehicle).arms[0]
@@ -182,11 +195,11 @@ def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_s
     clean = ridden.samples(Faults(), 1)
     share = {}
     for sign in (1, -1):
-        clean[:, bench.columns(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
-        own = recording(ridden, clean, tmp_path / f"{sign}.columns")
+        clean[:, bench.column_numbers(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
+        own = recording_of_samples(ridden, clean, tmp_path / f"{sign}.columns")
         agreement = Evidence(own, ridden.vehicle).agreement
         assert agreement is not None
-        share[sign] = agreement.typical()
+        share[sign] = agreement.median_unexplained()
     assert share[1] < 0.15 < 0.5 < share[-1]  # what is left: windows cut the spectra, and the vehicle is not linear
 
 
@@ -251,8 +264,8 @@ def test_a_spike_is_named_with_its_height_and_noise_is_none(width, tmp_path):
 def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
     """One sample, of which a doubt is told, in a channel in kN that stops the run."""
     samples = ridden.samples(Faults(noise=bench.NOISE), 5)
-    samples[1000, bench.columns(ridden, "rr_fz")] += 5e4
-    samples[:, bench.columns(ridden, "rr_fz")] *= 1e-3
+    samples[1000, bench.column_numbers(ridden, "rr_fz")] += 5e4
+    samples[:, bench.column_numbers(ridden, "rr_fz")] *= 1e-3
     assert {(one.check, one.weight) for one in bench.errors_and_doubts(ridden, samples, tmp_path)} >= {
         ("spikes", "doubt"),
         ("unit", "error"),
@@ -318,12 +331,12 @@ def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp
     from studies.recording_figures import figure
 
     samples = ridden.samples(Faults(noise=bench.NOISE, delay={"fl_fz": 3e-3}), 1)
-    samples[:, bench.columns(ridden, "rr_fz")] *= 1e-3
-    samples[500:700, bench.columns(ridden, "rl_mz")] = 0.0
-    evidence = Evidence(recording(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
+    samples[:, bench.column_numbers(ridden, "rr_fz")] *= 1e-3
+    samples[500:700, bench.column_numbers(ridden, "rl_mz")] = 0.0
+    evidence = Evidence(recording_of_samples(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
     drawn = {
         one.check
-        for i, one in enumerate(findings(evidence))
+        for i, one in enumerate(findings_of_all_checks(evidence))
         if one.weight != "note" and figure(one, evidence, tmp_path / f"{i}.png")
     }
     assert drawn == {"unit", "clipped", "shift"}
@@ -356,7 +369,7 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
 @pytest.mark.parametrize("hubs, lever", [(("fl", "fr", "rl", "rr"), -0.3), (("rr",), -0.34), (("fl", "fr"), 0.3)])
 def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
-    bench.referred(lever, *hubs)(ridden, samples)
+    bench.moments_about_point(lever, *hubs)(ridden, samples)
     said = bench.errors_and_doubts(ridden, samples, tmp_path)
     assert [one.check for one in said] == ["lever"]
     # the fit has a standard error of 0.01 m here, and the vehicle is not linear
@@ -370,9 +383,9 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
 )
 def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
     samples = ridden.samples(Faults(noise=bench.NOISE, bias=bias), bench.SEED)
-    own = recording(ridden, samples, tmp_path / "a.columns")
+    own = recording_of_samples(ridden, samples, tmp_path / "a.columns")
     inputs = Inputs(own, ridden.vehicle)
     forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)
     followed = TiltFilter(ridden.vehicle, "hub", own.period, Deviations(forces, (1.75e-3, 5e-3), 10.0))
     followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
-    assert [named in text for text in followed.doubts()] == [True] * bool(bias)
+    assert [named in text for text in followed.objections()] == [True] * bool(bias)

@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 
 from models.core.finding import Finding
-from models.drift.score import Verdict, rms
-from models.fatigue.damage import SLOPE, damage_ratio
+from models.drift.score import Verdict, root_mean_square
+from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
-from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, consequences, verdict_with_consequences
+from models.systems.measured.consequences import (
+    DAMAGE_LIMITS,
+    FORCE_LIMITS,
+    Consequence,
+    consequences,
+    verdict_with_consequences,
+)
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun, run
 from models.systems.measured.sections import Sections
-from models.systems.measured.virtual import VirtualMeasurement, recording
+from models.systems.measured.virtual import VirtualMeasurement, recording_of_samples
 from validation.measured import planted as bench
 
 SECTION = "rear right F"
@@ -35,13 +41,17 @@ def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> SectionOut
 def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path) -> tuple[Consequence, float, float]:
     """The consequence of a finding, and what the planted fault really does to the force of a spring."""
     samples = [ridden.samples(Faults(**one, noise=bench.NOISE), bench.SEED) for one in (faults, {})]
-    own, right = (recording(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
+    own, right = (recording_of_samples(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
     answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
     (found,) = consequences([finding], own, partial(made, ridden), answers, folder / "work")
     wrong, true = (
         made(ridden, each, folder / name).samples(answers[0])[500:] for each, name in ((own, "wrong"), (right, "true"))
     )
-    return found, rms(wrong - true) / rms(true - true.mean()), damage_ratio(wrong, true, SLOPE)
+    return (
+        found,
+        root_mean_square(wrong - true) / root_mean_square(true - true.mean()),
+        damage_ratio(wrong, true, WOEHLER_SLOPE),
+    )
 
 
 def named(ridden: VirtualMeasurement, check: str, size: float, unit: str, hub: str) -> Finding:
@@ -74,7 +84,7 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
         folder = tmp_path / str(length)
         folder.mkdir()
         answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
-        silent = recording(ridden, lossy, folder / "a.columns")
+        silent = recording_of_samples(ridden, lossy, folder / "a.columns")
         finding = named(ridden, "gaps", 0.0, "s", "rr")
         (found,) = consequences([finding], silent, partial(made, ridden), answers, folder / "work")
         grades.append(found.grade)
@@ -83,12 +93,12 @@ def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_
 
 def test_words_follow_the_bounds():
     finding, good = Finding("shift", "doubt", "fl", ""), Verdict("accepted", "held")
-    one = Consequence(finding, "a", FORCE[0], 1.0 + 0.9 * DAMAGE[0])
+    one = Consequence(finding, "a", FORCE_LIMITS[0], 1.0 + 0.9 * DAMAGE_LIMITS[0])
     several = (
         one,
-        replace(one, force=2 * FORCE[0]),
+        replace(one, force=2 * FORCE_LIMITS[0]),
         replace(one, damage=0.7),
-        replace(one, force=2 * FORCE[1]),
+        replace(one, force=2 * FORCE_LIMITS[1]),
         Consequence(finding),
     )
     words = [verdict_with_consequences(good, [each]).word for each in several]

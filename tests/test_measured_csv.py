@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.core.csv_header import find_head, heading, split_cells
+from models.core.csv_header import find_head, name_and_unit, split_cells
 from models.core.errors import InputError
 from models.measured.formats import csv_layout, csv_rows, open_source
 from models.measured.formats.csv_layout import clock_heading, is_clock, is_other_clock
@@ -138,7 +138,7 @@ def test_the_case_sees_a_form_that_is_read_wrong(tmp_path, monkeypatch):
 
 def test_the_case_sees_a_form_that_is_read_without_a_word(tmp_path, monkeypatch):
     monkeypatch.setattr(csv_layout, "decimal_sign", lambda path, line, separator, cells: ",")
-    monkeypatch.setattr(csv_rows, "_unquoted", lambda path, layout, text, line: text.replace(b'"', b""))
+    monkeypatch.setattr(csv_rows, "_without_quotes", lambda path, layout, text, line: text.replace(b'"', b""))
     assert any(row.status == "failed" for row in case.forms(tmp_path))
 
 
@@ -203,6 +203,6 @@ def test_titles_and_comments_are_the_comment_of_the_file(tmp_path):
 
 
 def test_lines_that_are_no_table_have_no_head():
-    lines = [csv_layout.Line(1, "time;date", 0, 10), csv_layout.Line(2, "Meier;today", 10, 22)]
+    lines = [csv_layout.FileLine(1, "time;date", 0, 10), csv_layout.FileLine(2, "Meier;today", 10, 22)]
     assert find_head(lines, is_clock, ",;\t") == [] and split_cells('"a;b";c', ";") == ["a;b", "c"]
-    assert heading("Fz [N]") == ("Fz", "N")
+    assert name_and_unit("Fz [N]") == ("Fz", "N")

@@ -10,23 +10,23 @@ from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
 from models.core.result import load as load_result
-from models.core.scene_effects import absent_effects, named_effects, with_effects, without
+from models.core.scene_effects import absent_effects, named_effects, scene_without, with_effects
 from models.core.systems import load
 from models.measured.columns import Columns
 from models.systems import run
 from models.systems.measured.scene import build
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from validation.absence.measured import FAULTS, write
 from validation.absence.of_systems import bare_scene
 
 
 def test_each_fault_of_transducers_comes_and_goes_alone():
-    scene = load(SCENES / "recording.toml")
+    scene = load(SCENES_FOLDER / "recording.toml")
     assert "sensor_noise" in named_effects(scene) and {*FAULTS} - {"sensor_noise"} <= {*absent_effects(scene)}
     full = with_effects(scene, *(name for name in FAULTS if name != "sensor_noise"))
     for name in FAULTS:
-        assert {*named_effects(full)} - {*named_effects(without(full, name))} == {name}
-    assert without(full, *FAULTS).virtual.faults == type(full.virtual.faults)()  # nothing of any is left
+        assert {*named_effects(full)} - {*named_effects(scene_without(full, name))} == {name}
+    assert scene_without(full, *FAULTS).virtual.faults == type(full.virtual.faults)()  # nothing of any is left
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -50,7 +50,7 @@ def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
     noisy = short()
     told = [
         measured.computed_quantities(own, "mujoco")
-        for own in (noisy, without(noisy, "sensor_noise"), with_effects(noisy, "offsets"))
+        for own in (noisy, scene_without(noisy, "sensor_noise"), with_effects(noisy, "offsets"))
     ]
     seats = [one.quantities["left seat F"].cases[0] for one in told]
     assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
@@ -117,4 +117,4 @@ def test_auto_leaves_out_what_the_question_does_not_see():
 
 def test_a_stabiliser_leaves_for_none_as_the_other_one_costs_more():
     for name in ("kalman_filter", "prescribed_angles"):
-        assert without(with_effects(short(), name), name).stabilise.method == "none"
+        assert scene_without(with_effects(short(), name), name).stabilise.method == "none"

@@ -9,7 +9,7 @@ import pytest
 from models.core.errors import InputError
 from models.measured.formats import csv as csv_format
 from models.measured.formats import csv_rows, mdf4, open_source, tdms, write
-from models.measured.formats.opened import Opened
+from models.measured.formats.opened import OpenFile
 from models.measured.formats.writing import ChannelGroup
 from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
@@ -46,14 +46,14 @@ def test_every_row_of_the_case_passes(tmp_path):
 
 
 def test_a_value_that_is_off_by_one_bit_is_seen_by_the_case(tmp_path, monkeypatch):
-    original = Opened._checked
+    original = OpenFile._checked
 
     def off(self, chosen, spans):
         for block in original(self, chosen, spans):
             block.values[0, 0] = np.nextafter(block.values[0, 0], np.inf)
             yield block
 
-    monkeypatch.setattr(Opened, "_checked", off)
+    monkeypatch.setattr(OpenFile, "_checked", off)
     rows, _ = case.round_trip(tmp_path / "trip.mf4", ".mf4")
     assert [row.id for row in rows if row.status == "failed"] == ["measured_formats.mf4.values"]
 
@@ -245,7 +245,9 @@ def test_numbers_in_other_hands(tmp_path):
 
 
 def test_shortest_and_longest_decimals_are_read_to_the_last_bit(tmp_path):
-    values = np.concatenate(([5e-324, 1.7976931348623157e308, 0.1, 2.0**-1074 * 3], case.normal(7, 0, 500, 1)[:, 0]))
+    values = np.concatenate(
+        ([5e-324, 1.7976931348623157e308, 0.1, 2.0**-1074 * 3], case.normal_samples(7, 0, 500, 1)[:, 0])
+    )
     rows = "".join(f"{i},{value:.17g}\n" for i, value in enumerate(values))
     (tmp_path / "a.csv").write_text("time [s],x [N]\n" + rows)
     assert np.array_equal(read(open_source(tmp_path / "a.csv"))["x"][1], values)
@@ -257,8 +259,8 @@ def test_without_the_count_of_columns_a_short_row_is_filled_up(tmp_path, monkeyp
 
 
 def test_without_the_marks_invalid_samples_pass_for_measured(tmp_path, monkeypatch):
-    original = mdf4._values
-    monkeypatch.setattr(mdf4, "_values", lambda *args: np.nan_to_num(original(*args)))
+    original = mdf4._physical_values
+    monkeypatch.setattr(mdf4, "_physical_values", lambda *args: np.nan_to_num(original(*args)))
     assert odd(mdf4_files, "MDF 4 with invalid samples").error(tmp_path) == np.inf
 
 

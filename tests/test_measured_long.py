@@ -11,20 +11,20 @@ from rainflow import extract_cycles
 
 from models.core.errors import InputError, RunFailed
 from models.core.signals import Sampled
-from models.fatigue.counting import count
+from models.fatigue.counting import counted_load
 from models.fatigue.damage import turning_points
-from models.fatigue.rainflow_cycles import cycles
+from models.fatigue.rainflow_cycles import rainflow_cycles
 from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.inputs import Inputs, StepGrid
 from models.systems.measured.section_run import AttitudeHold, Checkpoint, SectionRun, run
-from models.systems.measured.sections import AccelerometerPoint, Sections, points
-from models.systems.measured.verdict import checks, compare
+from models.systems.measured.sections import AccelerometerPoint, Sections, accelerometer_points
+from models.systems.measured.verdict import channels_to_compare, compare
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
-from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of
+from validation.measured.long_recording import answers_of, long_recording, repeated_pattern, run_killed_process, run_of
 from validation.spatial.cars import r19
 
 SECONDS = 0.2
@@ -164,7 +164,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
         assert StepGrid(step, 1e-3).rows(values, count) == pytest.approx(expected, abs=1e-12)
     with pytest.raises(InputError, match="part or a multiple"):
         StepGrid(3e-4, 1e-3).check()
-    signals, true = pattern(case.REPEATED)
+    signals, true = repeated_pattern(case.REPEATED)
     names = [signal.name for signal in signals]
     angles = true[:, [names.index("roll"), names.index("pitch")]]
     made = np.cumsum(Inputs(own.recording, own.vehicle).tilt(0, 201)[:, 2:], axis=0)
@@ -196,16 +196,16 @@ def test_rainflow_counts_as_the_library_does():
     for k in range(60):
         load = rng.integers(-5, 6, rng.integers(1, 60)).astype(float) if k % 2 else rng.normal(size=40)
         turns = turning_points(load)
-        found = np.column_stack(cycles(turns))
+        found = np.column_stack(rainflow_cycles(turns))
         expected = [(span, mean, part) for span, mean, part, *_ in extract_cycles([*turns, turns[-1]])]
         assert found == pytest.approx(np.array(expected).reshape(-1, 3))
     with pytest.raises(InputError, match="not finite"):
-        count(np.array([0.0, np.nan]))
+        counted_load(np.array([0.0, np.nan]))
 
 
 def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     own, outcome, _ = whole
-    signal, answer = next(pair for pair in checks(own) if pair[0].name == "front left_force")
+    signal, answer = next(pair for pair in channels_to_compare(own) if pair[0].name == "front left_force")
     true = outcome.samples(answer)
     names = own.recording.columns.names
     columns = Columns(outcome.columns.path.with_name("gain.f64"), names, own.recording.count)
@@ -215,7 +215,7 @@ def test_a_check_channel_with_a_wrong_gain_shows_it(whole):
     found = compare(Recording(own.recording.signals, columns, own.recording.period), outcome, signal, answer)
     assert found.damage == pytest.approx({slope: 1.1**slope for slope in (3.0, 5.0, 8.0)})
     assert [band.error / band.measured for band in found.bands] == pytest.approx([0.1] * len(found.bands))
-    assert found.explained == pytest.approx(0.99) and found.trusted == np.inf
+    assert found.explained_variance == pytest.approx(0.99) and found.trusted_time == np.inf
     assert found.offset == pytest.approx(np.mean(true) * (1 - 1 / 1.1))
 
 
@@ -235,7 +235,7 @@ def test_sections_are_named_and_their_files_are_not_overwritten(whole, tmp_path)
 def test_accelerometers_feel_gravity_and_motion(whole):
     own, outcome, _ = whole
     signals = tuple(replace(s, at="engine", gravity=False) for s in own.recording.find("acceleration", "acc fl"))
-    assert points(own.vehicle, signals, {}) == (
+    assert accelerometer_points(own.vehicle, signals, {}) == (
         AccelerometerPoint("engine", "engine", (0.95, 0.0, 0.55), gravity=False),
     )
     for name in ("acc fl_ax", "acc roof_az"):
@@ -260,9 +260,9 @@ def test_an_hour_at_1_khz_in_less_than_2_gb_killed_and_gone_on_to_the_same_bits(
     for times in (0, 3):
         folder = tmp_path / str(times)
         folder.mkdir()
-        recorded(3600.0, folder / "recording.f64")
+        long_recording(3600.0, folder / "recording.f64")
         if times:
-            killed(folder, 3600.0, 20.0, 60.0, times, lasting=60.0)
+            run_killed_process(folder, 3600.0, 20.0, 60.0, times, lasting=60.0)
         else:
             command = [sys.executable, "-m", "validation.measured.long_recording", str(folder), "3600", "20", "60"]
             told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()

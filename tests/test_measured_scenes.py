@@ -13,11 +13,11 @@ from models.measured.formats import open_source
 from models.measured.gaps import without_absurd
 from models.measured.resampling import resample_to
 from models.measured.signal import Places, Signal
-from models.measured.timing import timing
-from models.measured.units import conversion
-from models.systems.measured.channel_map import signals
-from models.systems.measured.clock import record
-from models.systems.measured.listing import describe, guess
+from models.measured.timing import sample_timing
+from models.measured.units import factor_to_si
+from models.systems.measured.channel_map import mapped_signals
+from models.systems.measured.clock import record_on_clock
+from models.systems.measured.listing import describe, guess_channel
 from models.systems.measured.plan import check
 from models.systems.measured.scene import build
 from studies.command.summary_numbers import summary_scalars
@@ -52,7 +52,7 @@ PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))
     ],
 )
 def test_units_as_they_are_spelt(unit, quantity, factor):
-    assert conversion(unit, quantity, "", "") == pytest.approx(factor, rel=1e-12)
+    assert factor_to_si(unit, quantity, "", "") == pytest.approx(factor, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_units_as_they_are_spelt(unit, quantity, factor):
 )
 def test_units_that_mean_something_else_are_refused(unit, quantity, said):
     with pytest.raises(InputError, match=said.replace("'", ".")):
-        conversion(unit, quantity, "scene.toml", "unit")
+        factor_to_si(unit, quantity, "scene.toml", "unit")
 
 
 def write_csv(path: Path, times: np.ndarray, **columns: np.ndarray) -> str:
@@ -96,7 +96,7 @@ def force(channel: str, at: str, **more: object) -> dict:
 def recorded(own, folder: Path):
     sources = [open_source(own.path(file.file)) for file in own.files]
     (folder / "work").mkdir(exist_ok=True)
-    return record(own, sources, signals(own, sources, PLACES), HUBS, folder / "work")
+    return record_on_clock(own, sources, mapped_signals(own, sources, PLACES), HUBS, folder / "work")
 
 
 def test_all_channels_on_the_clock_of_the_wheel_forces(tmp_path):
@@ -177,15 +177,15 @@ def test_times_that_are_late_repeated_or_go_back(tmp_path):
     t = np.arange(100) * 1e-3
     late = t.copy()
     late[[40, 41]] = late[[41, 40]]
-    sorted_out = timing(late, "a.csv")
+    sorted_out = sample_timing(late, "a.csv")
     assert sorted_out.times == pytest.approx(t) and sorted_out.order[40:42].tolist() == [41, 40]
     assert [f.weight for f in sorted_out.findings if f.check == "time"] == ["doubt"]
-    twice = timing(np.insert(t, 50, t[50]), "a.csv")
+    twice = sample_timing(np.insert(t, 50, t[50]), "a.csv")
     assert twice.times == pytest.approx(t) and "more than once" in twice.findings[0].text
-    again = timing(np.concatenate((t, t)), "a.csv")
+    again = sample_timing(np.concatenate((t, t)), "a.csv")
     assert len(again.times) == 100 and again.findings[0].weight == "error" and again.findings[0].size == t[-1]
     with pytest.raises(InputError, match="two samples or more"):
-        timing(np.zeros(3), "a.csv")
+        sample_timing(np.zeros(3), "a.csv")
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_times_that_are_late_repeated_or_go_back(tmp_path):
 )
 def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
     t = np.arange(1500) / rate
-    found = timing(way(np.round(t * 10**digits, 6)) / 10**digits, "a.csv")
+    found = sample_timing(way(np.round(t * 10**digits, 6)) / 10**digits, "a.csv")
     assert found.order is None and len(found.times) == 1500 and found.rate == pytest.approx(rate, rel=1e-12)
     assert np.ptp(found.times - t) < 1e-9 and [finding.weight for finding in found.findings] == ["note"]
 
@@ -202,20 +202,20 @@ def test_rounded_times_are_those_of_an_even_clock(rate, digits, way):
 @pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0, 2048.0])
 def test_seconds_since_1970_have_the_rate_of_their_clock(rate):
     """Steps are off by up to 1e-4 of themselves: their median is no rate, and samples fell between those of a clock."""
-    found = timing(np.array([float(f"{1767600000 + i / rate:.6f}") for i in range(8000)]), "a.csv")
+    found = sample_timing(np.array([float(f"{1767600000 + i / rate:.6f}") for i in range(8000)]), "a.csv")
     off = found.times - found.times[0] - found.period * np.arange(8000)
     assert found.rate == pytest.approx(rate, rel=1e-7) and np.abs(off).max() < 2e-6
 
 
 def test_times_that_no_even_clock_explains_are_not_believed():
     t = np.delete(np.arange(1500) * 1e-3, slice(700, 760))
-    broken = timing(np.round(t, 2), "a.csv")  # rounded, and a gap: where it lies, nobody can tell
+    broken = sample_timing(np.round(t, 2), "a.csv")  # rounded, and a gap: where it lies, nobody can tell
     assert broken.findings[0].weight == "error" and "1294 of 1440 times" in broken.findings[0].text
-    one_lost = timing(np.delete(np.arange(1500) * 1e-3, 700), "a.csv")
+    one_lost = sample_timing(np.delete(np.arange(1500) * 1e-3, 700), "a.csv")
     assert len(one_lost.times) == 1499 and one_lost.findings[0].check == "clock gaps"
     mark = np.arange(1500) * 1e-3
     mark[77] = 9.9e34
-    left = timing(mark, "a.csv")
+    left = sample_timing(mark, "a.csv")
     assert len(left.times) == 1499 and left.times[-1] == mark[-1] and "number 78" in left.findings[0].text
 
 
@@ -246,7 +246,7 @@ def test_a_wrong_unit_and_a_rough_road_are_no_marks(tmp_path):
 def test_jitter_is_measured(tmp_path):
     # 5 % of a period as sd of every time makes sqrt(2) times as much of every step; 4 standard errors of 2000 are 7 %
     times = (np.arange(2000) + 0.05 * np.random.default_rng(1).standard_normal(2000)) * 1e-2
-    found = next(finding for finding in timing(times, "a.csv").findings if finding.check == "jitter")
+    found = next(finding for finding in sample_timing(times, "a.csv").findings if finding.check == "jitter")
     assert found.size == pytest.approx(0.05 * np.sqrt(2) * 1e-2, rel=0.07)
 
 
@@ -278,7 +278,7 @@ def test_mistakes_in_the_map_are_told_in_one_sentence(tmp_path, change, said):
     rows = [{**force("fl", "fl"), **change}, force("fr", "fr")]
     with pytest.raises(InputError, match=said.replace("'", ".")) as error:
         own = scene(tmp_path, {"file": name, "channels": rows})
-        signals(own, [open_source(tmp_path / name)], PLACES)
+        mapped_signals(own, [open_source(tmp_path / name)], PLACES)
     assert "\n" not in str(error.value) and "Traceback" not in str(error.value)
 
 
@@ -287,7 +287,7 @@ def test_a_name_that_a_file_has_twice_is_told_with_the_names_that_tell_them_apar
     (tmp_path / "a.csv").write_text(f"time [s],fl [N],fl [N]\n{rows}\n")
     own = scene(tmp_path, {"file": "a.csv", "channels": [force("fl", "fl")]})
     with pytest.raises(InputError, match=r"is there 2 times in a.csv: name one of 'fl \(1\)', 'fl \(2\)'"):
-        signals(own, [open_source(tmp_path / "a.csv")], PLACES)
+        mapped_signals(own, [open_source(tmp_path / "a.csv")], PLACES)
 
 
 def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
@@ -313,7 +313,7 @@ def test_a_missing_wheel_or_angle_is_refused_before_anything_runs(tmp_path):
     ],
 )
 def test_guesses(name, unit, found):
-    own = guess(Channel(name, unit, "", 0, 10, None))
+    own = guess_channel(Channel(name, unit, "", 0, 10, None))
     assert (own and (own.quantity, own.at, own.component)) == found
 
 
@@ -332,9 +332,9 @@ def test_guesses(name, unit, found):
     ],
 )
 def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit, family, reason):
-    own = guess(Channel(name, unit, "", 0, 10, None, family=family))
+    own = guess_channel(Channel(name, unit, "", 0, 10, None, family=family))
     assert own.at == "" and f"({reason}" in own.left_out
-    own = guess(Channel("Unheard of FL", "N", "", 0, 10, None))
+    own = guess_channel(Channel("Unheard of FL", "N", "", 0, 10, None))
     assert "'unheard'" in own.left_out
     t = np.arange(200) * 1e-2
     write_csv(tmp_path / "a.csv", t, **{"FL_Fz__N": t, f"{name}__{unit}": t})
@@ -354,7 +354,7 @@ def test_forces_of_struts_are_not_guessed_to_be_hub_forces(tmp_path, name, unit,
     ],
 )
 def test_groups_and_words_that_only_sound_like_parts_are_guessed(name, unit, family, at):
-    own = guess(Channel(name, unit, "", 0, 10, None, family=family))
+    own = guess_channel(Channel(name, unit, "", 0, 10, None, family=family))
     assert own.at == at and not own.left_out
 
 

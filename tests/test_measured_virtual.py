@@ -10,18 +10,18 @@ from scipy.signal import lfilter
 from models.core.errors import InputError
 from models.core.strict import read
 from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults, check, measured
-from models.measured.gaps import filled
+from models.measured.faults_of_measurement import Faults, check, measured_samples
+from models.measured.gaps import filled_samples
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
 from models.systems.measured.inputs import Inputs, StepGrid
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as plane_run
-from models.systems.measured.section_run import DAMPING, AttitudeHold
+from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold
 from models.systems.measured.sections import SectionChannel
-from models.systems.measured.trust import Level, drift, position
-from models.systems.measured.verdict import Band, Compared, disagreement, uncertainty
-from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.systems.measured.trust import Level, position, predicted_drift
+from models.systems.measured.verdict import Band, ChannelComparison, disagreement, uncertainty
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.cut_vehicle import CutVehicle, cut, rigid
@@ -53,7 +53,7 @@ def _signal(channel: str, what: Quantity = "force", at: str = "fl", component: s
 
 
 def _faulty(faults: dict[str, object], signals: tuple[Signal, ...], truth: np.ndarray, path: int = 0) -> np.ndarray:
-    return measured(read(Faults, faults, ""), signals, truth, 1e-3, 2, 7, path)
+    return measured_samples(read(Faults, faults, ""), signals, truth, 1e-3, 2, 7, path)
 
 
 WAVE = np.sin(2 * np.pi * 3.0 * 1e-3 * np.arange(8001))
@@ -128,27 +128,29 @@ def test_gaps_are_filled_far_better_than_by_a_line_and_say_how_well() -> None:
     lost = hop.copy()
     for first in range(500, 19_500, 700):
         lost[first : first + 8] = np.nan
-    found, said = filled(lost, PERIOD, 0.03)
+    found, said = filled_samples(lost, PERIOD, 0.03)
     gone, at = np.isnan(lost), np.arange(len(hop))
     line = np.interp(at[gone], at[~gone], hop[~gone])
     error = np.std((found - hop)[gone])
     assert error < 0.5 * np.std(line - hop[gone])
-    assert 0.5 * error < np.mean([gap.doubt for gap in said]) < 3 * error  # the largest in a gap, not the mean one
+    assert (
+        0.5 * error < np.mean([gap.largest_deviation for gap in said]) < 3 * error
+    )  # the largest in a gap, not the mean one
     assert (found[~gone] == hop[~gone]).all()
-    kept, (gap,) = filled(np.where((at > 99) & (at < 200), np.nan, hop), PERIOD, 0.03)
-    assert np.isnan(kept[100:200]).all() and np.isnan(gap.doubt)
+    kept, (gap,) = filled_samples(np.where((at > 99) & (at < 200), np.nan, hop), PERIOD, 0.03)
+    assert np.isnan(kept[100:200]).all() and np.isnan(gap.largest_deviation)
 
 
 @pytest.mark.grounds("closed form")
 def test_half_steps_follow_cubics(car: CutVehicle, driven: VirtualMeasurement, tmp_path: Path) -> None:
     t = np.arange(-1.0, 12.0)[:, None]
     samples = 2.0 - t + 0.3 * t**2 - 0.05 * t**3
-    rows = StepGrid(1e-3, 2e-3).cubic(samples, 30)[:, 0]
+    rows = StepGrid(1e-3, 2e-3).cubic_rows(samples, 30)[:, 0]
     fine = np.arange(30) / 4
     assert np.abs(rows - (2.0 - fine + 0.3 * fine**2 - 0.05 * fine**3)).max() < 1e-13
-    inputs = Inputs(recording(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
-    start, end = inputs.around(0, 4), inputs.around(inputs.recording.count - 4, 4)
-    assert (inputs.around(5, 4) == inputs.wrenches(4, 7)).all()
+    inputs = Inputs(recording_of_samples(driven, driven.samples(Faults(), 1), tmp_path / "c.bin"), car)
+    start, end = inputs.wrenches_with_neighbours(0, 4), inputs.wrenches_with_neighbours(inputs.recording.count - 4, 4)
+    assert (inputs.wrenches_with_neighbours(5, 4) == inputs.wrenches(4, 7)).all()
     assert np.allclose(start[0], 2 * start[1] - start[2]) and len(start) == len(end) == 7
 
 
@@ -175,17 +177,17 @@ def test_drift_by_its_closed_laws(car: CutVehicle) -> None:
     bias = np.zeros(24)
     bias[2] = 5.0
     level = Level(8.0, 1.0, bias, tilt=(0.01, 0.0), rate=(0.0, 0.02))
-    hub = drift(car, level, PERIOD, 8.0, "hub")
+    hub = predicted_drift(car, level, PERIOD, 8.0, "hub")
     law = own.angle_variance(deviation, PERIOD, hub.times[1:])
     assert np.abs(hub.deviations[200:] / np.sqrt(law[199:]) - 1).max() < 1e-3
     turning = np.linalg.solve(own.inertia, own.moments(bias[None])[0])
-    assert np.allclose(hub.means["bias"][-1], turning * 32.0)
-    assert np.allclose(hub.means["tilt at the start"][-1], [0.01, 0.0, 0.0])
-    space = drift(car, level, PERIOD, 2.0, "inertial")
-    late = space.means["tilt at the start"][[1000, 2000], 0]
+    assert np.allclose(hub.mean_errors["bias"][-1], turning * 32.0)
+    assert np.allclose(hub.mean_errors["tilt at the start"][-1], [0.01, 0.0, 0.0])
+    space = predicted_drift(car, level, PERIOD, 2.0, "inertial")
+    late = space.mean_errors["tilt at the start"][[1000, 2000], 0]
     assert abs(np.log(late[1] / late[0]) / own.toppling()[0] - 1) < 0.01  # cosh has become exp, products are small
-    assert hub.passes(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
-    assert hub.angle > space.angle and space.trusted < hub.trusted == 8.0
+    assert hub.passing_time(0.02, "rate at the start") == pytest.approx(1.0, abs=0.01)
+    assert hub.angle > space.angle and space.trusted_time < hub.trusted_time == 8.0
     off = position(car, Level(0.0, 0.0, tilt=(0.01, 0.0)), PERIOD, np.array([2.0]), "hub")[0]
     assert np.allclose(off, [0.0, 9.81 * 0.01 * 2.0, 0.0])
 
@@ -194,9 +196,9 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
     hold = AttitudeHold(force=1e-9, moment=1e-9, angle=2e-3, rate=5e-3)
     corner, h = 2 * np.pi * hold.bandwidth, PERIOD
     noise = np.random.default_rng(1).normal(size=(2, 400_000)) * np.array([[hold.angle], [hold.rate]])
-    pushed = corner**2 * noise[0] + 2 * DAMPING * corner * noise[1]
+    pushed = corner**2 * noise[0] + 2 * PULL_DAMPING * corner * noise[1]
     # x'' + 2 z w x' + w^2 x = pushed, by semi-implicit Euler
-    c = 2 * DAMPING * corner * h
+    c = 2 * PULL_DAMPING * corner * h
     angle = lfilter([h * h], [1.0, corner**2 * h * h + c - 2.0, 1.0 - c], pushed)
     assert 2 * angle.std() / uncertainty(car, hold, h) == pytest.approx(1.0, abs=0.05)  # some hundred correlation times
     assert uncertainty(car, replace(hold, method="none"), h) == 0.0
@@ -204,7 +206,9 @@ def test_uncertainty_of_a_held_angle_is_what_its_pull_lets_through(car: CutVehic
 
 def test_a_channel_that_disagrees_is_told_from_its_noise() -> None:
     answer = SectionChannel("a", "N", "")
-    band = Compared(_signal("a"), answer, 0.0, (Band(0.0, 9.0, 10.0, 3.0), Band(9.0, 99.0, 0.0, 4.0)), 0.0, {}, np.inf)
+    band = ChannelComparison(
+        _signal("a"), answer, 0.0, (Band(0.0, 9.0, 10.0, 3.0), Band(9.0, 99.0, 0.0, 4.0)), 0.0, {}, np.inf
+    )
     assert disagreement(band) == pytest.approx(0.5)  # 5 of 10
     assert disagreement(band, 3.0) == pytest.approx(np.sqrt(16 / 91))
     assert disagreement(band, np.nan) == disagreement(band) and disagreement(band, 5.0) == 0.0
@@ -231,7 +235,9 @@ def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, 
     found = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
     pitch = found.outcome.columns.read("chassis pitch")
     assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
-    assert found.verdict.word == "accepted" and found.outcome.surprise < 1.0  # nothing but the stated noise is missing
+    assert (
+        found.verdict.word == "accepted" and found.outcome.normalised_innovation < 1.0
+    )  # nothing but the stated noise is missing
     free = plane_run(PlaneJob(planar, "itwm_drift", hold=AttitudeHold("none", force=2000.0)), tmp_path / "free")
     assert free.verdict.word == "stabilise" and free.trust is not None and free.trust.until is not None
 

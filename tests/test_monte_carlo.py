@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import block_diag, expm
 
 from models.core.errors import InputError
-from models.ride.covariance import stationary
-from models.ride.monte_carlo import MODES, _Cells, at_constant_speed, path_cell, variances_along_drive
+from models.ride.covariance import stationary_covariance
+from models.ride.monte_carlo import LEGENDRE_MODES, _Cells, at_constant_speed, path_cell, variances_along_drive
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
@@ -19,8 +19,8 @@ def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
     vehicle, road = ride("half_car")
     cells = _Cells(vehicle, road, None, 6.0)
     front, rear = cells.length / 6.0, cells.length / 9.0  # the rear axle comes by faster
-    first, second = (cells._crossed(duration)[1] for duration in (front, rear))
-    modes = np.vstack([first[:, : 2 * MODES], second[:, 2 * MODES :]])
+    first, second = (cells._cell_transition(duration)[1] for duration in (front, rear))
+    modes = np.vstack([first[:, : 2 * LEGENDRE_MODES], second[:, 2 * LEGENDRE_MODES :]])
     A = block_diag(*(duration * cells.at_rest + cells.length * cells.per_speed for duration in (front, rear)))
     B = np.vstack(cells.at_unit_speed.B) * cells.length**0.5
     n = len(A)
@@ -57,7 +57,7 @@ def test_copies_at_constant_speed_agree_with_the_covariance(case):
     vehicle, road = ride("half_car")
     road = road if case == "delayed" else type(road)(road.F, road.G, road.heights, road.lengths, independent=True)
     found = at_constant_speed(vehicle, road, 15.0, 6.0, copies=512, seed=SEED)
-    exact = stationary(at_speed(vehicle, road, 15.0))
+    exact = stationary_covariance(at_speed(vehicle, road, 15.0))
     assert (found.error / found.variance).max() < 0.03  # sharp enough to tell the two cases, 30 % apart at the centre
     assert np.abs(found.z(exact.deviation[None])).max() < 4.0
 

@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.systems import load
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from studies.motion import run
 
 SHORT = [
@@ -19,7 +19,7 @@ CLEAN = [*SHORT, "effects.accelerometers.deviation=0.0"]
 
 
 def ran(changes, folder, engines=("reference",), file=None):
-    scene = load(SCENES / "motion.toml", changes)
+    scene = load(SCENES_FOLDER / "motion.toml", changes)
     own = scene.model_copy(update={"folder": str(file or scene.folder)})
     return run(own, engines, folder, lambda text, part: None)
 
@@ -90,6 +90,6 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(change, words
 
 
 def test_a_scene_without_accelerometers_is_refused(tmp_path):
-    scene = load(SCENES / "study_road.toml", ["study=motion"])
+    scene = load(SCENES_FOLDER / "study_road.toml", ["study=motion"])
     with pytest.raises(InputError, match=r"effects\.accelerometers"):
         run(scene, ("reference",), tmp_path, lambda text, part: None)

@@ -16,12 +16,12 @@ from models.systems.hub_forces.scene import build as scene_of
 from models.systems.measured.sections import Sections
 from models.vehicles.cut_vehicle import cut
 from validation.faults.native import CAMPAIGN
-from validation.spatial.cars import r19, rough_car, static, twin
+from validation.spatial.cars import r19, rough_car, static_forces, twin
 from validation.spatial.native_builds import (
-    NATIVE,
+    NATIVE_ENGINES,
     acceleration_error,
     equations_error,
-    model,
+    hub_model,
     path_error,
     random_states,
 )
@@ -40,7 +40,7 @@ def turned():
     return cut(replace(whole, springs=springs), "body")
 
 
-@pytest.mark.parametrize("engine", NATIVE)
+@pytest.mark.parametrize("engine", NATIVE_ENGINES)
 def test_every_spring_mount_bar_and_joint_is_the_engines_own(engine):
     """Counted in the built model; curves and friction that stay shared are named with the reason."""
     share = native_share(engine, r19())
@@ -59,16 +59,16 @@ def test_native_compiled_and_written_forces_agree(car):
     """Accelerations at random states to 1e-12 of each coordinate's largest: rounding of stiff bushes leaves 6e-14."""
     states = random_states(car, 6)
     assert equations_error(car, states) < 1e-12
-    for engine in NATIVE:
+    for engine in NATIVE_ENGINES:
         assert acceleration_error(engine, car, states) < 1e-12
         assert path_error(engine, car, 30) < 1e-12
 
 
 def test_the_first_evaluation_reads_no_stale_law():
     """At rest on its static loads a native vehicle stands still: preloads and hub forces balance, m/s^2."""
-    for engine in NATIVE:
+    for engine in NATIVE_ENGINES:
         for car in (r19(), rough_car()):
-            built = build(engine, car, static(car, 3), 1e-3, 1e-3, "native")
+            built = build(engine, car, static_forces(car, 3), 1e-3, 1e-3, "native")
             rest = np.zeros(car.size)
             assert np.abs(built.acceleration(0.0, rest, rest)).max() < 1e-9
 
@@ -95,7 +95,7 @@ def test_guides_feel_the_couple_of_an_axis_that_their_body_keeps():
     q, v = random_states(car, 1)[0]
     q[[i for i, place in enumerate(car.tree.coordinates()) if place == ("engine", "rx")]] = 0.0
     sections = Sections(car, "body", wanted=("engine guide",))
-    built = model("reference", car, "compiled")
+    built = hub_model("reference", car, "compiled")
     row = sections.read(built.numbers, np.concatenate((q, v))[None], 2)[0]
     felt = {answer.name: value for answer, value in zip(sections.answers, row, strict=True)}
     largest = max(abs(felt[f"engine guide {part}"]) for part in ("Fx", "Fy", "Mz"))
@@ -131,12 +131,12 @@ def test_a_scene_chooses_whose_springs_it_has(monkeypatch):
 def test_an_enforced_tilt_is_refused_where_forces_are_in_two_places():
     car, guide = r19(), np.zeros((3, 6))
     with pytest.raises(Refused, match="enforced tilt"):
-        build("mujoco", car, HubInputs(static(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
+        build("mujoco", car, HubInputs(static_forces(car, 3).hubs, guide=guide), 1e-3, 1e-3, "native")
 
 
 def test_show_tells_what_is_native_and_what_is_shared():
     told = describe(scene())
-    for engine in NATIVE:
+    for engine in NATIVE_ENGINES:
         assert f"native     {engine}: 21 of 21 springs, mounts and bars, 19 joints" in told
     assert "shared     hub forces, tyres on the road" in told
     told = describe(scene(run={"duration": 0.06, "forces": "compiled"}))

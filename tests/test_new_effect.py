@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended, names_of, own_table, rebuilt, with_effects
+from models.core.scene_effects import extended_by_effects, names_of, own_table, rebuilt_scene, with_effects
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
 from studies.command_line import list_scenes
-from validation.absence.of_systems import added_counts, bare_scene, declared
+from validation.absence.of_systems import added_counts, bare_scene, declared_counts
 from validation.cases import absent
 
 ANCHOR = '''"""A rope that draws the chassis level."""
@@ -81,7 +81,7 @@ def test_a_new_effect_of_another_system(new_file, capsys):
     list_scenes()
     assert "Chambers that are clogged" in capsys.readouterr().out
     found = added_counts("braking", "slow_chambers", quick=True)
-    assert found == declared("braking", "slow_chambers", ["reference"])
+    assert found == declared_counts("braking", "slow_chambers", ["reference"])
     scene = with_effects(bare_scene("braking"), "slow_chambers")
     assert "effect     slow_chambers" in import_module(SYSTEMS["braking"].plan).describe(scene)
 
@@ -103,8 +103,8 @@ def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
     assert "slow_chambers" in capsys.readouterr().out
     table = {**own_table(bare_scene("braking")), "effects": {"slow_chambers": {"time": 0.2}}}
     with pytest.raises(InputError, match=told) as found:
-        scene = rebuilt(table, bare_scene("braking"))
-        extended("what a system built", scene)
+        scene = rebuilt_scene(table, bare_scene("braking"))
+        extended_by_effects("what a system built", scene)
     assert ".py" in found.value.file
 
 

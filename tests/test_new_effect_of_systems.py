@@ -12,27 +12,27 @@ from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import QuantityChange, price_list
 from models.advice.ride_choice.reduced import FullScene
 from models.core.errors import InputError
-from models.core.scene_effects import listing, own_table, rebuilt, with_effects, without
+from models.core.scene_effects import effect_sentences, own_table, rebuilt_scene, scene_without, with_effects
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
 from models.systems.contact.cases_table import answer_table
-from models.systems.contact.run import Built, contact
+from models.systems.contact.run import Built, solved_contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
 from models.systems.handling.energy import unaccounted
 from models.systems.handling.run import drive_run
-from models.systems.ride.nonlinear import ridden
+from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import ReducedScene, illegal
-from models.systems.ride.reduced_scene import without as without_effects
+from models.systems.ride.reduced_scene import ReducedScene, refusal_reason
+from models.systems.ride.reduced_scene import reduced_without as without_effects
 from models.systems.ride.scene import build as build_ride
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from validation.absence.contact import BARE_SCENE as CONTACT
-from validation.absence.of_systems import added_counts, bare_scene, counts_and_paths, declared
+from validation.absence.of_systems import added_counts, bare_scene, counts_and_paths, declared_counts
 
 
 @dataclass(frozen=True)
@@ -167,20 +167,20 @@ def test_a_new_effect_is_one_file(system, new_file):
     new, scene = NEW[system], bare_scene(system)
     before, table = counts_and_paths(system, scene), own_table(scene) | {"effects": {NEW[system].name: {}}}
     with pytest.raises(InputError, match="no such effect"):
-        rebuilt(table, scene)
+        rebuilt_scene(table, scene)
     new_file(system, new.name, new.text)
-    assert listing(system)[new.name] == f"New: {new.name}"
-    assert added_counts(system, new.name, quick=True) == declared(system, new.name, [next(iter(before))])
+    assert effect_sentences(system)[new.name] == f"New: {new.name}"
+    assert added_counts(system, new.name, quick=True) == declared_counts(system, new.name, [next(iter(before))])
     own = with_effects(scene, new.name)
     assert f" {new.name}: what {new.name} costs" in import_module(SYSTEMS[system].plan).describe(own)
     _judged(before, counts_and_paths(system, own), new.apart)
-    assert without(own, new.name) == scene  # and the very path that it had before there was a file:
+    assert scene_without(own, new.name) == scene  # and the very path that it had before there was a file:
     assert all(
         before[engine] == found
-        for engine, found in counts_and_paths(system, without(own, new.name), quick=True).items()
+        for engine, found in counts_and_paths(system, scene_without(own, new.name), quick=True).items()
     )
     with pytest.raises(InputError, match=rf"effects.{new.name}.{new.parameter} = -1"):
-        rebuilt(table | {"effects": {new.name: {new.parameter: -1.0}}}, scene)
+        rebuilt_scene(table | {"effects": {new.name: {new.parameter: -1.0}}}, scene)
 
 
 def _judged(before, after, apart):
@@ -241,8 +241,12 @@ def test_a_new_effect_of_ride_is_in_every_linear_vehicle_and_in_both_engines(new
     for damping in by.values():
         assert damping - bare_one == pytest.approx(by["reference"] - bare_one, rel=1e-6, abs=1e-6)
     assert np.trace(by["reference"] - bare_one) > 4 * 800.0  # two dampers of two ends, and pitch
-    runs = {engine: ridden(engine, vehicle, road_path(road, 20.0, 2e-3), 0.1) for engine in ("exudyn", "mujoco")}
-    rough = ridden("mujoco", vehicle_of(scene), road_path(excitation_of(scene, wheels(vehicle)), 20.0, 2e-3), 0.1)
+    runs = {
+        engine: drive_over_road(engine, vehicle, road_path(road, 20.0, 2e-3), 0.1) for engine in ("exudyn", "mujoco")
+    }
+    rough = drive_over_road(
+        "mujoco", vehicle_of(scene), road_path(excitation_of(scene, wheels(vehicle)), 20.0, 2e-3), 0.1
+    )
     one, two = (run.run.positions for run in runs.values())
     assert np.abs(one - two).max() < 1e-12 * np.abs(one).max() < np.abs(two - rough.run.positions).max()
 
@@ -251,17 +255,17 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     """Exactly: each is left out of the equations themselves. What needs another one goes with it."""
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace("COST", 'NEEDS = ("delay", "dampers")\nCOST', 1))
-    scene = load(SCENES / "ride_choice.toml")
+    scene = load(SCENES_FOLDER / "ride_choice.toml")
     held = ReducedScene.complete(own := with_effects(scene, "dampers", "tread"))
     there = {effect.name: effect for effect in effects_of(held)}
     assert {"dampers", "tread"} <= there.keys() and there["delay front to rear"].needs == ("tread",)
-    assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([there["dampers"]])
+    assert "cannot be left out alone: leave out tread, too, for it needs it" in refusal_reason([there["dampers"]])
     whole = FullScene(held, 20.0)
     rest = whole.reduced(without_effects(held, [there["dampers"], there["tyre damping"], there["tread"]]))
     other = ReducedScene.complete(scene)
     known = FullScene(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
-    monkeypatch.setattr(effects_of_ride, "STEPS", 20)
+    monkeypatch.setattr(effects_of_ride, "TIMED_STEPS", 20)
     monkeypatch.setattr(effects_of_ride, "absent_effects", lambda scene: ("gravity_and_preload", "drag", "weighting"))
     prices = {price.name: price for price in price_list(own).prices}
     assert prices["tread"].counts[1]["states"] - prices["tread"].counts[0]["states"] == 4 and prices["dampers"].why
@@ -291,7 +295,7 @@ def test_a_new_law_of_friction_is_in_every_theory(theory, new_file):
         build_contact(table | {"effects": {"rain": {"share": 0.5}}}),
         build_contact(table | {"contact": {"load": 8e4, "friction": 0.1}}),
     )
-    one, other = (contact(scene).roll((5e-3, 1e-3, 0.0), 9) for scene in (own, known))
+    one, other = (solved_contact(scene).roll((5e-3, 1e-3, 0.0), 9) for scene in (own, known))
     assert (one.fx, one.fy) == (other.fx, other.fy) != (0.0, 0.0)
 
 
@@ -329,7 +333,7 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
         ).text,
     )
     scene = build_contact(CONTACT | {"ellipse": None, "profiles": {}, "method": {"name": "simplified"}})
-    assert contact(with_effects(scene, "ground")).pressing.area < contact(scene).pressing.area
+    assert solved_contact(with_effects(scene, "ground")).pressing.area < solved_contact(scene).pressing.area
     new_file(
         "contact",
         "worn_in",
@@ -347,7 +351,7 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
         ).text,
     )
     with pytest.raises(InputError, match=r"'simplified': has constant friction, .*: use fastsim"):
-        contact(with_effects(scene, "worn_in"))
+        solved_contact(with_effects(scene, "worn_in"))
 
 
 @pytest.mark.parametrize("system", [name for name in NEW if name != "measured"])
@@ -384,6 +388,12 @@ def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):
 
 
 def test_a_large_number_of_a_price_has_no_exponent():
-    changed = effects_text._changed(QuantityChange("slip [1]", "N", 10_712.0, 2.904, 0.121))
-    assert changed == "slip by 10,700 N (290 % +- 12 %)" and effects_text._micros((4139.0, 96.0)) == "4,140 +- 100 us"
-    assert effects_text._changed(QuantityChange("slip", "1", 0.0123, np.inf)) == "slip by 0.0123 (from nothing)"
+    changed = effects_text._changed_quantity_text(QuantityChange("slip [1]", "N", 10_712.0, 2.904, 0.121))
+    assert (
+        changed == "slip by 10,700 N (290 % +- 12 %)"
+        and effects_text._microseconds_text((4139.0, 96.0)) == "4,140 +- 100 us"
+    )
+    assert (
+        effects_text._changed_quantity_text(QuantityChange("slip", "1", 0.0123, np.inf))
+        == "slip by 0.0123 (from nothing)"
+    )

@@ -19,7 +19,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.absence import bare_cars
 from validation.cases.ride_engines import of_name
 from validation.hard_cases import setups
-from validation.spatial.cars import static
+from validation.spatial.cars import static_forces
 
 STEP, STEPS = 1e-4, 4
 BOUND = 1e-3
@@ -40,7 +40,7 @@ def ride(engine: str) -> tuple[Model, Trajectory]:
 
 def hub_forces(engine: str) -> tuple[Model, Trajectory]:
     vehicle = cut(load_vehicle("r19_free"), "body")
-    model = build(engine, vehicle, static(vehicle, 2 * STEPS + 1), STEP, STEPS * STEP)
+    model = build(engine, vehicle, static_forces(vehicle, 2 * STEPS + 1), STEP, STEPS * STEP)
     moved = 1e-3 * np.random.default_rng(1).standard_normal((2, vehicle.size))
     return model, model.run(*moved)
 

@@ -17,7 +17,7 @@ from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation import conformity
 from validation.common import checks, wrong_engines
@@ -136,7 +136,7 @@ def test_a_scipy_solver_of_a_dozen_lines_agrees_with_the_reference(own, tmp_path
         force_scene(tmp_path, duration=SHORT, interpolation="held"),
     ]
     for scene in scenes:
-        assembly = assemble(scene)
+        assembly = assembly_of_scene(scene)
         found = build(name, assembly, Settings(name, 1e-3, SHORT, 1e-11)).run()
         tight = build("reference", assembly, Settings("DOP853", 1e-3, SHORT, 1e-13)).run()
         assert np.abs(found.states - tight.states).max() < 1e-7 and found.counts["force calls"] > 100
@@ -193,8 +193,8 @@ def test_a_name_that_leads_nowhere_is_refused_by_the_command(name, said, twinrig
 
 
 def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_are(own, twinrig, capsys):
-    assert wrong_engines.passed() == []
-    assert wrong_engines.passed((wrong_engines.Right,)) == ["Right"]
+    assert wrong_engines.integrators_that_pass() == []
+    assert wrong_engines.integrators_that_pass((wrong_engines.Right,)) == ["Right"]
     assert twinrig("run", "study_road", "--engine", own(Scipy), "--set", "run.duration=0.2") == 0
     assert "of the largest motion from the reference" in capsys.readouterr().out
 
@@ -203,7 +203,7 @@ def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
     monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
     monkeypatch.setattr(outside, "CEILING", 1e9)
-    assert len(wrong_engines.passed()) == len(wrong_engines.WRONG_ENGINES)
+    assert len(wrong_engines.integrators_that_pass()) == len(wrong_engines.WRONG_ENGINES)
 
 
 def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_path):
@@ -218,8 +218,8 @@ def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_pat
 
 def judged(name, folder, monkeypatch):
     """Rows of the conformity of a class without hard cases."""
-    monkeypatch.setattr(conformity, "FAMILIES", ())
-    rows = {row.id.removeprefix("conformity."): row.status for row in conformity._rows(name, folder)}
+    monkeypatch.setattr(conformity, "HARD_CASE_FAMILIES", ())
+    rows = {row.id.removeprefix("conformity."): row.status for row in conformity._conformity_rows(name, folder)}
     assert rows.pop("others") == "not run"  # the table says what it does not judge
     return rows
 
@@ -257,7 +257,7 @@ def test_a_method_that_keeps_a_tolerance_is_not_blamed_for_rounding_or_for_steps
         "static equilibrium": "passed",
         "+z is down": "passed",
     }
-    for family in conformity.FAMILIES:
+    for family in conformity.HARD_CASE_FAMILIES:
         module = import_module(f"validation.hard_cases.{family}")
         monkeypatch.setattr(module, "CASES", tuple(case for case in module.CASES if case.name in kept))
     rows = list(conformity._hard_cases(own(Scipy), tmp_path))

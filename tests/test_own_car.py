@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.brake.sprung import sprung
+from models.brake.sprung import suspended_vehicle
 from models.core.errors import InputError, Refused
 from models.core.systems import load
 from models.engines.braking_sprung_plain import PlainOnSprings
@@ -17,7 +17,7 @@ from models.engines.spatial_protocol import build as build_spatial
 from models.multibody.numbers import Controls, Handling
 from models.multibody.plain.rolling import PlainRolling
 from models.multibody.plain.statics import held_at_rest
-from models.own_model.car import car
+from models.own_model.car import vehicle_of_file
 from models.systems.braking import plan as braking_plan
 from models.systems.handling import plan as handling_plan
 from models.systems.handling.assumptions import assumptions
@@ -25,13 +25,13 @@ from models.systems.handling.energy import unaccounted
 from models.systems.handling.export import of_handling
 from models.systems.handling.run import REFERENCE, build, drive_run
 from models.systems.ride.run import run as run_ride
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial import JointElement, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import build_vehicle, load_vehicle
-from validation.braking.sprung_box import braked, steady_torques
+from validation.braking.sprung_box import braked_vehicle, steady_torques
 from validation.own_model.car_energy import energies_apart
 from validation.own_model.cars import SALOON
 
@@ -42,7 +42,7 @@ LANE_CHANGE = Controls(steer=((0.1, 0.0), (0.4, 0.04), (0.9, -0.04), (1.2, 0.0))
 def read(folder: Path, text: str = SALOON, name: str = "saloon.xml") -> SpatialVehicle:
     path = folder / name
     path.write_text(text, encoding="utf-8")
-    return car(path)
+    return vehicle_of_file(path)
 
 
 @pytest.fixture(scope="module")
@@ -324,20 +324,24 @@ def test_springs_on_hinges_are_refused_where_springs_lie_between_points(saloon):
 
 def test_it_brakes_in_both_engines_as_the_plain_equations_do(saloon):
     """To rounding where the wheels' forces are held over the same steps; its wheels spin with the file's inertia."""
-    own = sprung(saloon, 0.0)
+    own = suspended_vehicle(saloon, 0.0)
     assert (own.plane.front.spin_inertia, own.plane.rear.spin_inertia) == (1.1, 1.2)
     torques = steady_torques(500.0, 500.0, 200.0, 200.0)
-    in_engines = [braked(own, surface("wet"), engine, 0.05, 1e-3) for engine in ("exudyn", "mujoco")]
+    in_engines = [braked_vehicle(own, table_of_surface("wet"), engine, 0.05, 1e-3) for engine in ("exudyn", "mujoco")]
     cars = (*in_engines, replace(in_engines[0], engine=PlainOnSprings(own)))
     exudyn, mujoco, plain = (each.run(torques, 6.0, 0.1).states[-1] for each in cars)
     assert mujoco == pytest.approx(exudyn, abs=1e-10)
     assert plain == pytest.approx(exudyn, abs=1e-10)
     assert exudyn[1, 0] < 5.9  # m/s
     lost = replace(saloon, joint_elements=saloon.joint_elements[:-1])
-    without = braked(sprung(lost, 0.0), surface("wet"), "mujoco", 0.05, 1e-3).run(torques, 6.0, 0.1).states[-1]
+    without = (
+        braked_vehicle(suspended_vehicle(lost, 0.0), table_of_surface("wet"), "mujoco", 0.05, 1e-3)
+        .run(torques, 6.0, 0.1)
+        .states[-1]
+    )
     assert np.abs(without - exudyn).max() > 1e-4  # the fault: no rear bar
     with pytest.raises(InputError, match="of its spin must be above 0"):
-        sprung(replace(saloon, tyres=(replace(saloon.tyres[0], spin_inertia=1.3), *saloon.tyres[1:])), 0.0)
+        suspended_vehicle(replace(saloon, tyres=(replace(saloon.tyres[0], spin_inertia=1.3), *saloon.tyres[1:])), 0.0)
 
 
 def blocks(page: Path) -> dict[str, str]:
@@ -392,6 +396,6 @@ def test_a_run_that_passes_a_stop_of_the_file_says_so(saloon):
     column = handling.vehicle.coordinates().index(("fl strut", "z"))
     positions = np.zeros((3, len(handling.vehicle.coordinates())))
     positions[:, column] = 0.0, 0.08, 0.11
-    watched = stop.watched({"positions": positions})["fl strut z"]
-    assert (stop.least, stop.most, stop.unit) == (-0.09, 0.1, "m")
-    assert [not stop.least <= value <= stop.most for value in watched] == [False, False, True]
+    watched = stop.watched_values({"positions": positions})["fl strut z"]
+    assert (stop.lower_limit, stop.upper_limit, stop.unit) == (-0.09, 0.1, "m")
+    assert [not stop.lower_limit <= value <= stop.upper_limit for value in watched] == [False, False, True]

@@ -10,22 +10,29 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from models.advice.own_model_price import priced
+from models.advice.own_model_price import recommended_settings
 from models.core.errors import InputError, RunFailed
 from models.engines.free_vehicle import free_model
 from models.own_model import certificate as certifying
-from models.own_model.builds import BUILDS, SOFT, as_parsed, equations, largest_gap, sliding
-from models.own_model.certificate import agreement, certificate, moved_at, reference, softness, states_of
-from models.own_model.coordinates import turned
-from models.own_model.elements import elements, told_apart
-from models.own_model.explain import compare, culprits
+from models.own_model.builds import ALL_BUILDS, SOFT_BUILD, as_parsed, equations_of_build, largest_gap, sliding_states
+from models.own_model.certificate import (
+    agreement_of_build,
+    certificate,
+    moved_at,
+    reference_of_file,
+    softness_difference,
+    states_of,
+)
+from models.own_model.coordinates import turned_by_angles
+from models.own_model.elements import elements_of_model, told_apart
+from models.own_model.explain import compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
-from models.own_model.path import _model as march_of
-from models.own_model.path import paths
-from models.own_model.reading import described
+from models.own_model.path import _model_of_build as march_of
+from models.own_model.path import compare_paths
+from models.own_model.reading import described_model
 from models.own_model.states import random_states
-from models.own_model.urdf import misread
+from models.own_model.urdf import misread_numbers
 from validation.own_model.files import (
     ARM_URDF,
     CART,
@@ -81,7 +88,9 @@ def as_drawn(twin):
 def test_dry_friction_and_couplings_are_those_of_the_file(geared):
     """To rounding; a coupling or a friction that is 1 % off is seen in every build."""
     states = states_of(geared, 20)
-    assert len(sliding(geared, states)) == len(states) > len(sliding(geared, as_drawn(geared)))  # faster rates slide
+    assert (
+        len(sliding_states(geared, states)) == len(states) > len(sliding_states(geared, as_drawn(geared)))
+    )  # faster rates slide
     for row in certificate(geared, 20):
         assert max(row.mass, row.force, row.acceleration) < 1e-11, row
     (gear, shut), (swing, slide) = geared.driven.couplings, geared.driven.frictions
@@ -94,12 +103,12 @@ def test_dry_friction_and_couplings_are_those_of_the_file(geared):
 def test_what_couplings_give_way_in_mujoco_is_the_law_of_its_documentation(geared):
     """Far from rigid, and the law all the same: to 1e-8, MuJoCo's tolerance; the fault: another impedance."""
     states = states_of(geared, 10)
-    assert softness(geared, 10) > 1e-3
-    soft = reference(geared, states, SOFT)
-    assert agreement("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
+    assert softness_difference(geared, 10) > 1e-3
+    soft = reference_of_file(geared, states, SOFT_BUILD)
+    assert agreement_of_build("", soft, moved_at(softly_coupled(geared), states)).acceleration < 1e-8
     ties = tuple(replace(tie, solimp=(0.91, *tie.solimp[1:])) for tie in geared.driven.couplings)
     other = replace(geared, driven=replace(geared.driven, couplings=ties))
-    assert agreement("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
+    assert agreement_of_build("", soft, moved_at(softly_coupled(other), states)).acceleration > 1e-4
 
 
 SPRUNG = changed(
@@ -116,14 +125,14 @@ def test_springs_of_ball_and_free_joints_are_those_of_the_file(tmp_path):
     as_read, model = _read(tmp_path, SPRUNG).twin, _read(tmp_path, SPRUNG, "turned.xml").twin.model
     at = int(model.joint("ball").qposadr[0])
     model.qpos_spring[at : at + 4] = np.array((0.9, 0.1, -0.3, 0.2)) / np.linalg.norm((0.9, 0.1, -0.3, 0.2))
-    for twin in (as_read, described(model, "turned")):
+    for twin in (as_read, described_model(model, "turned")):
         assert all(max(row.force, row.acceleration) < 1e-11 for row in certificate(twin, 20))
         for i, change in ((0, "stiffness"), (1, "damping")):
             springs = list(twin.driven.turning_springs)
             springs[i] = replace(springs[i], **{change: 1.01 * getattr(springs[i], change)})
             wrong = replace(twin.driven, turning_springs=tuple(springs))
             assert all(row.acceleration > 1e-6 for row in certificate(replace(twin, driven=wrong), 20))
-    assert paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
+    assert compare_paths(as_read, 0.01).energy < 1e-4  # steps of 10 ms
 
 
 def test_a_sprung_ball_joint_is_one_of_several_joints_of_its_body(tmp_path):
@@ -182,9 +191,9 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
     states = states_of(twin, 5)
     for row in certificate(twin, 5):
         assert max(row.mass, row.acceleration) < 1e-11, row  # rounding, MuJoCo's solver included
-    soft = reference(twin, states, SOFT)
-    assert softness(twin, 5) > 1e-3
-    assert agreement("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
+    soft = reference_of_file(twin, states, SOFT_BUILD)
+    assert softness_difference(twin, 5) > 1e-3
+    assert agreement_of_build("", soft, moved_at(softly_coupled(twin), states)).acceleration < 1e-8
     ties = twin.driven.connections
     for i, tie in enumerate(ties):
         body, (x, y, z) = tie.ends[0]
@@ -193,7 +202,7 @@ def test_joints_between_bodies_are_those_of_the_file(tmp_path, text):
         assert all(row.acceleration > 1e-6 for row in certificate(wrong, 5))
         other = (*ties[:i], replace(tie, solimp=(tie.solimp[0] + 0.01, *tie.solimp[1:])), *ties[i + 1 :])
         yielding = replace(twin, driven=replace(twin.driven, connections=other))
-        assert agreement("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
+        assert agreement_of_build("", soft, moved_at(softly_coupled(yielding), states)).acceleration > 1e-5
 
 
 def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
@@ -202,8 +211,8 @@ def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
     loop, grip = twin.driven.connections
     turned = replace(grip, axes=(grip.axes[0] @ Rotation.from_rotvec((0.0, 0.02, 0.0)).as_matrix(), grip.axes[1]))
     wrong = replace(twin.driven, connections=(loop, turned))
-    assert all(largest_gap(twin, build, states_of(twin, 5)) < 1e-11 for build in BUILDS)
-    assert all(largest_gap(replace(twin, driven=wrong), build, states_of(twin, 5)) > 1e-3 for build in BUILDS)
+    assert all(largest_gap(twin, build, states_of(twin, 5)) < 1e-11 for build in ALL_BUILDS)
+    assert all(largest_gap(replace(twin, driven=wrong), build, states_of(twin, 5)) > 1e-3 for build in ALL_BUILDS)
     monkeypatch.setattr("models.own_model.builds.free_model", lambda build, driven: free_model(build, wrong))
     assert [row.alike for row in certificate(twin, 5)] == [False, False, True]
 
@@ -215,8 +224,8 @@ def test_inertia_of_rotors_is_in_what_gives_way(tmp_path):
 
 def test_a_path_of_a_body_hung_by_a_point_and_of_a_loop_of_bars(tmp_path):
     """The step is coarse, since Exudyn's constraints are asked four times in each."""
-    report = paths(_read(tmp_path, HUNG).twin, 0.02)
-    assert report.alike and report.soft and not report.failed and report.distances["mujoco"] > 1e-6
+    report = compare_paths(_read(tmp_path, HUNG).twin, 0.02)
+    assert report.alike and report.has_soft_constraints and not report.failed and report.distances["mujoco"] > 1e-6
     assert report.energy < 1e-3  # of the largest, by steps of 20 ms
 
 
@@ -247,8 +256,8 @@ def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
 
 
 def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
-    report = paths(geared)
-    assert report.alike and report.soft and 0.0 < report.horizon < 1.0
+    report = compare_paths(geared)
+    assert report.alike and report.has_soft_constraints and 0.0 < report.comparison_horizon < 1.0
     assert report.distances["mujoco"] > 1e-6  # its couplings give way
     assert any("dry friction sticks" in line for line in report.lines())
 
@@ -276,7 +285,7 @@ def test_softness_of_couplings_is_listed_and_not_compared(tmp_path, geared):
 
 def test_couplings_and_dry_friction_have_no_price(geared):
     with pytest.raises(InputError, match="no price here"):
-        priced(geared, 1e-4, None)
+        recommended_settings(geared, 1e-4, None)
 
 
 def test_ends_of_a_tendon_between_sites_are_told(tmp_path):
@@ -285,14 +294,14 @@ def test_ends_of_a_tendon_between_sites_are_told(tmp_path):
     second = _read(tmp_path, TIED.replace('pos=".3 .1 -.2"', 'pos=".3 .1 -.21"'), "b.xml")
     (difference,) = compare(first.twin, second.twin, 3).influential
     assert (difference.kind, difference.owner) == ("ends", "tendon 'rope'")
-    assert paths(first.twin).energy < 1e-7  # Simpson's rule at 2 ms, on a rope that moves at 6 Hz
+    assert compare_paths(first.twin).energy < 1e-7  # Simpson's rule at 2 ms, on a rope that moves at 6 Hz
 
 
 def test_urdf_is_built_and_its_xml_says_the_same(tmp_path):
     file = _read(tmp_path, ARM_URDF, "arm.urdf")
     assert all(row.acceleration < 1e-12 for row in certificate(file.twin, 20))
-    assert misread(file) == []
-    assert file.limited == ("joint 'shoulder'",)
+    assert misread_numbers(file) == []
+    assert file.ignored_limits == ("joint 'shoulder'",)
     assert "1 shapes" in file.notes[0]
 
 
@@ -301,7 +310,7 @@ def test_inertia_rotation_lost_by_a_parser_is_told(tmp_path):
     body = file.twin.model.body("upper").id
     file.twin.model.body_iquat[body] = 1.0, 0.0, 0.0, 0.0
     file.twin.model.body_sameframe[:] = 0
-    (lost,) = misread(file)
+    (lost,) = misread_numbers(file)
     assert (lost.kind, lost.owner) == ("inertia", "body 'upper'")
     assert "in the file" in lost.sentence()
 
@@ -311,7 +320,7 @@ def test_an_element_that_a_build_lacks_is_named(tmp_path, monkeypatch, kind):
     """The fault: the plain equations forget one number of a joint."""
     file, field = _read(tmp_path, CART.replace('name="tilt"', 'name="tilt" armature=".1" stiffness="3"')), kind
     owner = {"damping": "joint 'x'"}.get(kind, "joint 'tilt'")
-    honest = equations
+    honest = equations_of_build
 
     def forgetful(twin, build):
         vehicle = twin.driven.vehicle
@@ -320,11 +329,13 @@ def test_an_element_that_a_build_lacks_is_named(tmp_path, monkeypatch, kind):
         driven = replace(twin.driven, vehicle=replace(vehicle, joint_elements=rows))
         return honest(replace(twin, driven=driven) if build == "plain" else twin, build)
 
-    monkeypatch.setattr(certifying, "equations", forgetful)
-    monkeypatch.setattr("models.own_model.explain.equations", forgetful)
+    monkeypatch.setattr(certifying, "equations_of_build", forgetful)
+    monkeypatch.setattr("models.own_model.explain.equations_of_build", forgetful)
     exudyn, engine, plain = certificate(file.twin, 5)
     assert exudyn.alike and engine.alike and not plain.alike
-    assert [(element.kind, element.owner) for element, _ in culprits(file.twin, "plain", 5)] == [(kind, owner)]
+    assert [(element.kind, element.owner) for element, _ in removals_that_agree(file.twin, "plain", 5)] == [
+        (kind, owner)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -360,7 +371,7 @@ def test_a_difference_in_what_is_off_is_listed_as_not_compared(tmp_path):
         ("friction_loss",),
     )
     comparison = compare(first.twin, second.twin, 3)
-    assert comparison.alike and comparison.silent == ()
+    assert comparison.alike and comparison.silent_differences == ()
     assert {each.kind for each in comparison.not_compared} == {"friction loss", "range"}
 
 
@@ -373,7 +384,7 @@ def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, origi
 
 def test_joints_without_a_partner_are_named(tmp_path, original):
     comparison = compare(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
-    assert comparison.apart is None and "joint 'hinge' of a has no partner" in comparison.unmatched
+    assert comparison.acceleration_agreement is None and "joint 'hinge' of a has no partner" in comparison.unmatched
 
 
 def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
@@ -381,12 +392,12 @@ def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
     arm = _read(tmp_path, ARM_URDF, "arm.urdf")
     mujoco.mj_saveLastXML(str(tmp_path / "arm.xml"), arm.twin.model)
     comparison = compare(arm.twin, read(tmp_path / "arm.xml").twin, 3)
-    assert comparison.apart is not None and comparison.apart.acceleration < 1e-4
+    assert comparison.acceleration_agreement is not None and comparison.acceleration_agreement.acceleration < 1e-4
 
 
 def test_paths_of_all_builds_agree_and_the_ledger_closes(tmp_path):
-    report = paths(_read(tmp_path, CART).twin)
-    assert report.alike and not report.failed and not report.quaternions
+    report = compare_paths(_read(tmp_path, CART).twin)
+    assert report.alike and not report.failed and not report.has_quaternions
     assert report.energy < 1e-9  # Simpson's rule at steps of 2 ms
 
 
@@ -398,9 +409,9 @@ def test_a_build_with_another_path_is_told(tmp_path, monkeypatch):
         driven = replace(twin.driven, gravity=(1.0 + 1e-6) * twin.driven.gravity)
         return honest(replace(twin, driven=driven) if build == "mujoco" else twin, build)
 
-    monkeypatch.setattr("models.own_model.path._model", heavier)
-    report = paths(_read(tmp_path, CART).twin)
-    assert not report.alike and report.horizon > 0.9 and report.distances["mujoco"] > 1e-7
+    monkeypatch.setattr("models.own_model.path._model_of_build", heavier)
+    report = compare_paths(_read(tmp_path, CART).twin)
+    assert not report.alike and report.comparison_horizon > 0.9 and report.distances["mujoco"] > 1e-7
 
 
 LIMITED = changed(CART, "tilt", 'axis="0 1 0"', 'axis="0 1 0" range="-20 20" margin=".02"').replace(
@@ -417,7 +428,7 @@ def test_inside_their_ranges_limits_do_nothing(tmp_path):
 
     def apart(states):
         moved = moved_at(as_parsed(replace(twin, model=with_limits)), states)
-        return agreement("", reference(twin, states, SOFT), moved).acceleration
+        return agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved).acceleration
 
     assert apart(states) == 0.0 and not any(struck(q) for q, _ in states)
     beyond = [(1.2 * q, v) for q, v in states]
@@ -425,8 +436,8 @@ def test_inside_their_ranges_limits_do_nothing(tmp_path):
 
 
 def test_a_path_that_strikes_a_limit_is_compared_up_to_there(tmp_path):
-    report = paths(_read(tmp_path, LIMITED).twin)
-    assert report.alike and report.struck == "joint 'tilt'" and 0.0 < report.horizon < 1.0
+    report = compare_paths(_read(tmp_path, LIMITED).twin)
+    assert report.alike and report.struck_limit == "joint 'tilt'" and 0.0 < report.comparison_horizon < 1.0
     assert any("joint 'tilt' strikes its limit, which is not built" in line for line in report.lines())
 
 
@@ -448,7 +459,7 @@ def test_what_a_limit_adds_is_no_stop_of_springs(tmp_path):
 
 def test_path_with_quaternions_differs_by_the_error_of_the_step(tmp_path):
     twin = _read(tmp_path, JOINTED).twin
-    coarse, fine = (paths(twin, step).distances["the file's own model"] for step in (4e-3, 2e-3))
+    coarse, fine = (compare_paths(twin, step).distances["the file's own model"] for step in (4e-3, 2e-3))
     assert 8.0 < coarse / fine < 32.0  # order 4: 16
 
 
@@ -596,15 +607,15 @@ def test_a_hundred_spoilt_files_are_answered(tmp_path):
 def test_angular_velocity_of_the_angles():
     """G rates is the angular velocity in turned axes, and G' rates its rate at constant rates, by differences."""
     angles, rates, h = np.array((0.3, -0.5, 0.8)), np.array((0.7, 1.1, -0.4)), 1e-6
-    before, after = turned(angles - h * rates, rates), turned(angles + h * rates, rates)
-    rotation, gains, bias = turned(angles, rates)
+    before, after = turned_by_angles(angles - h * rates, rates), turned_by_angles(angles + h * rates, rates)
+    rotation, gains, bias = turned_by_angles(angles, rates)
     spin = rotation.T @ (after[0] - before[0]) / (2 * h)
     assert np.allclose([spin[2, 1], spin[0, 2], spin[1, 0]], gains @ rates, atol=1e-9)
     assert np.allclose((after[1] - before[1]) @ rates / (2 * h), bias, atol=1e-9)
 
 
 def test_elements_have_names_units_and_values(tmp_path):
-    listed = elements(_read(tmp_path, JOINTED).twin.model)
+    listed = elements_of_model(_read(tmp_path, JOINTED).twin.model)
     assert listed["armature", "joint 'hinge'"].unit == "kg m^2"
     assert listed["damping", "joint 'slide'"].unit == "N s/m"
     assert np.allclose(listed["inertia", "body 'arm'"].value, (0.3, 0.4, 0.5, 0.02, 0.03, 0.04))

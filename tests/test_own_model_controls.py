@@ -5,9 +5,9 @@ import pytest
 
 from models.core.errors import InputError
 from models.own_model import path as marching
-from models.own_model.control_table import Leg, constant_leg, held_at, read_controls
+from models.own_model.control_table import PathSection, constant_leg, held_at, read_controls
 from models.own_model.file import read
-from models.own_model.path import FILE, paths
+from models.own_model.path import FILE_BUILD_NAME, compare_paths
 from models.own_model.states import random_states
 from validation.own_model.files import CART
 
@@ -39,12 +39,12 @@ def twin(tmp_path):
 def test_every_build_has_the_path_of_the_file_under_its_controls(twin, tmp_path):
     """The file's own model takes the controls themselves, the builds have them in the bias of their actuators."""
     table = read_controls(tmp_path / "controls.csv", twin.model)
-    report = paths(twin, table=table)
-    assert report.alike and not report.failed and report.horizon == 1.0
-    assert report.distances[FILE] < 1e-12
+    report = compare_paths(twin, table=table)
+    assert report.alike and not report.failed and report.comparison_horizon == 1.0
+    assert report.distances[FILE_BUILD_NAME] < 1e-12
     assert report.energy < 1e-5  # Simpson's rule over odd numbers of steps of 2 ms; 6e-8 at 1 ms
     assert "under controls.csv" in report.lines()[0]
-    assert report.distances != paths(twin).distances
+    assert report.distances != compare_paths(twin).distances
 
 
 @pytest.mark.parametrize("fault", ["late", "constant", "small"])
@@ -61,20 +61,25 @@ def test_controls_of_another_build_are_told(twin, tmp_path, monkeypatch, fault):
 
     honest = marching.path_by
     monkeypatch.setattr(marching, "path_by", wrong)
-    report = paths(twin, table=table)
-    assert not report.alike and report.distances[FILE] > 1e-8
+    report = compare_paths(twin, table=table)
+    assert not report.alike and report.distances[FILE_BUILD_NAME] > 1e-8
 
 
 def test_the_ledger_sees_other_controls(twin, tmp_path):
     """The fault: work of the constant controls of the file."""
-    legs = read_controls(tmp_path / "controls.csv", twin.model).legs(twin, 500, 0.002)
+    legs = read_controls(tmp_path / "controls.csv", twin.model).path_sections(twin, 500, 0.002)
     path = marching.path_by(legs, "plain", tuple(rows[0] for rows in random_states(twin, 1)), 0.002)
-    assert marching._ledger(legs, path, 0.002) < 1e-5 < 1e-2 < marching._ledger(constant_leg(twin, 500), path, 0.002)
+    assert (
+        marching._energy_imbalance(legs, path, 0.002)
+        < 1e-5
+        < 1e-2
+        < marching._energy_imbalance(constant_leg(twin, 500), path, 0.002)
+    )
 
 
 def test_rows_become_legs_that_fill_the_path(twin, tmp_path):
-    legs = read_controls(tmp_path / "controls.csv", twin.model).legs(twin, 500, 0.002)
-    assert [leg.steps for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, Leg) for leg in legs)
+    legs = read_controls(tmp_path / "controls.csv", twin.model).path_sections(twin, 500, 0.002)
+    assert [leg.steps for leg in legs] == [50, 125, 175, 150] and all(isinstance(leg, PathSection) for leg in legs)
     assert np.array_equal(legs[1].controls, [0.5, 1.0, -3.0, 1.0])  # in the order of the actuators
 
 
@@ -103,7 +108,7 @@ def test_a_row_between_two_steps_is_refused(twin, tmp_path):
     path = tmp_path / "controls.csv"
     path.write_text(TABLE.replace("350", "351"))
     with pytest.raises(InputError, match=r"row 3.*0\.351.*multiples of the step, 0\.002 s"):
-        paths(twin, table=read_controls(path, twin.model))
+        compare_paths(twin, table=read_controls(path, twin.model))
 
 
 @pytest.mark.parametrize("name", ["time", "actuator 3"])

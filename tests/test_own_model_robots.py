@@ -11,7 +11,7 @@ import pytest
 from models.core.errors import InputError
 from models.own_model.certificate import certificate
 from models.own_model.file import read
-from models.own_model.urdf import misread
+from models.own_model.urdf import misread_numbers
 
 LEGS = ("ant", "half_cheetah", "hopper", "humanoid", "humanoidstandup", "walker2d", "walker2d_v5")
 CARTS = ("inverted_pendulum", "inverted_double_pendulum", "point")
@@ -46,7 +46,7 @@ def test_mjcf_of_others_is_certified(name):
 @pytest.mark.parametrize("name", URDF)
 def test_urdf_of_others_is_certified_and_nothing_of_it_lost(name):
     file = read(_path(name), OUTSIDE)
-    assert misread(file) == []
+    assert misread_numbers(file) == []
     for row in certificate(file.twin, STATES):
         assert row.acceleration < 1e-10, row
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from models.own_model import certificate as certifying
-from models.own_model.builds import SOFT, Moved, equations
-from models.own_model.certificate import agreement, certificate, moved_at, reference, states_of
+from models.own_model.builds import SOFT_BUILD, Moved, equations_of_build
+from models.own_model.certificate import agreement_of_build, certificate, moved_at, reference_of_file, states_of
 from models.own_model.explain import compare
 from models.own_model.file import read
-from models.own_model.rounding import _solved
+from models.own_model.rounding import _with_solver_rounding
 from validation.own_model.files import GEARED
 
 
@@ -34,10 +34,14 @@ def test_no_coordinate_hides_behind_one_that_accelerates_more(tmp_path, monkeypa
     first, second = (_read(tmp_path, _beside(k), f"{k}.xml").twin for k in (10.0, stiffness))
     comparison = compare(first, second, 3)
     (difference,) = comparison.influential
-    assert not comparison.alike and difference.owner == "joint 'x'" and comparison.apart.worst == "joint 'x'"
+    assert (
+        not comparison.alike
+        and difference.owner == "joint 'x'"
+        and comparison.acceleration_agreement.worst == "joint 'x'"
+    )
     assert all(row.alike for row in certificate(first, 20))
-    honest = equations
-    monkeypatch.setattr(certifying, "equations", lambda twin, build: honest(second, build))
+    honest = equations_of_build
+    monkeypatch.setattr(certifying, "equations_of_build", lambda twin, build: honest(second, build))
     assert not any(row.alike for row in certificate(first, 20))
 
 
@@ -69,7 +73,9 @@ def test_rounding_of_a_stiff_constraint_is_no_difference(tmp_path, safe):
     assert all(row.alike for row in certificate(twin, 20))
     apart = 1.0 + 1e-3
     state = [(q * apart, v) for q, v in states_of(twin, 5)]
-    assert agreement("", reference(twin, state, SOFT), moved_at(equations(twin, SOFT), state)).alike
+    assert agreement_of_build(
+        "", reference_of_file(twin, state, SOFT_BUILD), moved_at(equations_of_build(twin, SOFT_BUILD), state)
+    ).alike
 
 
 @pytest.mark.parametrize("anchor", ["0 0 0", "0 .1 0"])
@@ -90,5 +96,5 @@ def test_solving_rounds_a_light_coordinate_only_where_the_mass_matrix_couples_it
     none, acceleration = np.zeros(2), np.array([1.0, 1e6])
     for off, expected in ((0.0, acceleration), (0.5, np.array([[5.0, 4.0], [4.0, 5.0]]) / 3.0 @ acceleration)):
         moved = Moved(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
-        solved = _solved(Moved(np.zeros((2, 2)), none, none), moved)
+        solved = _with_solver_rounding(Moved(np.zeros((2, 2)), none, none), moved)
         assert solved.acceleration == pytest.approx(expected, rel=1e-12)

@@ -9,13 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.core.errors import InputError
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from studies import animation
 from studies.command.asked import load_scene
 from studies.pictures import video
-from studies.pictures.camera import Camera, picture
-from studies.pictures.drawing import lines, pose
-from studies.pictures.film import gaps
+from studies.pictures.camera import Camera, painted_picture
+from studies.pictures.drawing import arrow_lines, drawn_pose
+from studies.pictures.film import largest_differences
 from studies.pictures.page import Page
 from studies.pictures.shapes import arrow, box
 
@@ -31,24 +31,24 @@ def hunting():
 def test_both_engines_report_the_same_poses(vehicle, hunting):
     found = import_module(f"studies.pictures.{vehicle}")
     _, motions = hunting if vehicle == "wheelset" else found.filmed(0.05, TIMES, ("exudyn", "mujoco"))
-    places, turns, _ = gaps(*motions)
+    places, turns, _ = largest_differences(*motions)
     assert places < 1e-9 and turns < 1e-9
     for motion in motions:  # they move, and a hundred times further than that: the slowest on a road that fades in
-        assert max(np.ptp(place, axis=0).max() for place in motion.places.values()) > 1e-7
+        assert max(np.ptp(place, axis=0).max() for place in motion.positions.values()) > 1e-7
         for turn in motion.turns.values():
             np.testing.assert_allclose(turn @ turn.swapaxes(1, 2), np.broadcast_to(np.eye(3), turn.shape), atol=1e-12)
 
 
 def test_a_difference_is_told(hunting):
     _, (one, two) = hunting
-    moved = replace(two, places={name: place + np.array([0.0, 1e-6, 0.0]) for name, place in two.places.items()})
-    assert gaps(one, moved)[0] == pytest.approx(1e-6, rel=1e-6)
+    moved = replace(two, positions={name: place + np.array([0.0, 1e-6, 0.0]) for name, place in two.positions.items()})
+    assert largest_differences(one, moved)[0] == pytest.approx(1e-6, rel=1e-6)
 
 
 def test_arrows_are_as_long_as_their_forces(hunting):
     stage, (motion, _) = hunting
-    for own, (tail, vector) in zip(motion.arrows, lines(motion, stage, 1), strict=True):
-        np.testing.assert_allclose(vector, stage.kinds[own.kind].scale * own.vectors[1], rtol=1e-15)
+    for own, (tail, vector) in zip(motion.arrows, arrow_lines(motion, stage, 1), strict=True):
+        np.testing.assert_allclose(vector, stage.arrow_styles[own.kind].scale * own.vectors[1], rtol=1e-15)
         drawn = arrow(tail, vector, 0.02, (1.0, 0.0, 0.0))
         along = (drawn.corners - tail) @ vector / np.linalg.norm(vector)
         assert along.min() == pytest.approx(0.0, abs=1e-12) and along.max() == pytest.approx(np.linalg.norm(vector))
@@ -57,12 +57,14 @@ def test_arrows_are_as_long_as_their_forces(hunting):
 def test_contact_forces_carry_the_wheelset_where_its_wheels_touch(hunting):
     _, (motion, _) = hunting
     total = sum(own.vectors[0] for own in motion.arrows)
-    assert total[2] == pytest.approx(-CHOSEN.load, rel=1e-3)  # it starts in vertical balance; the springs share by um
+    assert total[2] == pytest.approx(
+        -CHOSEN_WHEELSET.load, rel=1e-3
+    )  # it starts in vertical balance; the springs share by um
     for own in motion.arrows:
         side = 1.0 if own.name.endswith("right") else -1.0
         # Within the rail's head of 36 mm to both sides, at the height of its top; z is down.
-        assert abs(own.points[0, 1] - side * CHOSEN.half_gauge) < 0.036
-        assert own.points[0, 2] == pytest.approx(CHOSEN.radius, abs=2e-3)
+        assert abs(own.points[0, 1] - side * CHOSEN_WHEELSET.half_gauge) < 0.036
+        assert own.points[0, 2] == pytest.approx(CHOSEN_WHEELSET.radius, abs=2e-3)
 
 
 def test_what_is_magnified_leans_more_and_spins_as_it_does(hunting):
@@ -71,9 +73,9 @@ def test_what_is_magnified_leans_more_and_spins_as_it_does(hunting):
     turned = replace(
         motion,
         turns={"wheelset": np.array([(lean * spin).as_matrix()])},
-        places={"wheelset": np.array([[0.0, 2e-3, 0.0]])},
+        positions={"wheelset": np.array([[0.0, 2e-3, 0.0]])},
     )
-    place, turn = pose(turned, replace(stage, magnified=5.0), "wheelset", 0)
+    place, turn = drawn_pose(turned, replace(stage, magnification=5.0), "wheelset", 0)
     np.testing.assert_allclose(place, [0.0, 1e-2, 0.0], atol=1e-15)
     np.testing.assert_allclose(turn, (Rotation.from_euler("x", 0.05) * spin).as_matrix(), atol=1e-12)
 
@@ -82,9 +84,9 @@ def test_the_nearer_of_two_boxes_hides_the_other_one_and_lengths_are_those_of_th
     camera = Camera((10.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     red, blue = box(1.0, 2.0, 1.0, (1.0, 0.0, 0.0)), box(1.0, 1.0, 1.0, (0.0, 0.0, 1.0))
     for order in ([red, blue.at(3.0, 0.0, 0.0)], [blue.at(3.0, 0.0, 0.0), red]):
-        image = picture(camera, [order], 80, 60, np.ones((2, 3)))
+        image = painted_picture(camera, [order], 80, 60, np.ones((2, 3)))
         assert image[30, 40, 2] > 0.2 > image[30, 40, 0]
-    (left, right), _ = camera.seen(np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]]), 80, 60)
+    (left, right), _ = camera.projected(np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]]), 80, 60)
     assert right[0] - left[0] == pytest.approx(camera.pixels(60)) and right[1] == left[1] == 30.0
 
 
@@ -98,7 +100,9 @@ def test_a_film_has_as_many_frames_as_its_duration_and_rate_say(hunting, tmp_pat
 
     frames = list(Page(*hunting).frames())
     assert frames[0].shape == (720, 1280, 3) and (frames[0] != frames[2]).any()
-    for kind in hunting[0].kinds.values():  # the legend's arrow below the pictures, as long as its force is drawn
+    for kind in hunting[
+        0
+    ].arrow_styles.values():  # the legend's arrow below the pictures, as long as its force is drawn
         shaft = np.isclose(frames[0][480:492], 255.0 * np.array(kind.colour), atol=1.0).all(axis=2).any(axis=0)
         long = kind.scale * kind.legend * hunting[0].camera.pixels(400)
         assert np.ptp(np.flatnonzero(shaft)) == pytest.approx(long, abs=5.0)  # its tip is blurred
@@ -112,7 +116,7 @@ def changed(*changes):
 
 
 def test_without_the_extra_the_stills_are_kept_and_one_sentence_names_it(hunting, monkeypatch, tmp_path):
-    monkeypatch.setattr(video, "PACKAGES", ("no_such_package",))
+    monkeypatch.setattr(video, "VIDEO_PACKAGES", ("no_such_package",))
     own = import_module("studies.pictures.wheelset")
     monkeypatch.setattr(own, "filmed", lambda *given: hunting)
     summary = animation.run(changed("film.duration=0.05"), ("exudyn", "mujoco"), tmp_path, lambda text, part: None)

@@ -163,7 +163,7 @@ def test_the_kernel_from_curvatures_to_forces(cells):
     draw, how, elastic = np.random.default_rng(5), pointer(cells), PAIR.G / (1.0 - PAIR.nu)
     for ellipse in drawn(6, 4):
         small, large = sorted(10.0 ** draw.uniform(-1.0, 1.5, 2))
-        major, minor, approach = plain.hertz(small, large, elastic, ellipse.load)
+        major, minor, approach = plain.hertz_ellipse(small, large, elastic, ellipse.load)
         a, b = (major, minor) if draw.random() < 0.5 else (minor, major)
         A, B = (small, large) if a > b else (large, small)
         flexible = plain.flexibilities(a, b, PAIR.G, PAIR.nu)
@@ -184,6 +184,10 @@ def test_the_kernel_from_curvatures_to_forces(cells):
 def linear(ellipse):
     """Kalker 1967, all of the area sticking."""
     c11, c22, c23, c33 = plain.coefficients(ellipse.a / ellipse.b, PAIR.nu)
-    matrix = [[c11, 0, 0], [0, c22, c23 * ellipse.c], [0, -c23 * ellipse.c, c33 * ellipse.c**2]]
-    forces = -PAIR.G * ellipse.c**2 * np.array(matrix) @ [ellipse.xi_x, ellipse.xi_y, ellipse.spin]
+    matrix = [
+        [c11, 0, 0],
+        [0, c22, c23 * ellipse.mean_semi_axis],
+        [0, -c23 * ellipse.mean_semi_axis, c33 * ellipse.mean_semi_axis**2],
+    ]
+    forces = -PAIR.G * ellipse.mean_semi_axis**2 * np.array(matrix) @ [ellipse.xi_x, ellipse.xi_y, ellipse.spin]
     return np.append(forces, 1.0)

@@ -6,14 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from models.brake.brake import Brake, of_wheels, torques
+from models.brake.brake import Brake, of_wheels, torques_of_pressures
 from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.plane_vehicle import GRAVITY, PAPER, truck
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.port.ask import ask
 from models.brake.pressure import Chambers, resting_chambers
 from models.brake.steering import Steering
-from models.drift.score import low_pass, rms
+from models.drift.score import low_pass, root_mean_square
 from models.multibody.numbers import Handling
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
@@ -31,17 +31,17 @@ MEMORY = 0.1
 
 def test_loads_of_a_braked_truck_balance_its_weight_and_its_inertia():
     """Forces, moments about the axle across (x), and about the axis along (y) of the four wheels."""
-    plane = truck(PAPER)
+    plane = plane_of_truck(PAPER_TRUCK)
     x, y = plane.place.T
-    m, lever = PAPER.mass, PAPER.mass * PAPER.height
-    assert plane.masses == pytest.approx([m]) and plane.inertias == pytest.approx([PAPER.yaw_inertia])
+    m, lever = PAPER_TRUCK.mass, PAPER_TRUCK.mass * PAPER_TRUCK.height
+    assert plane.masses == pytest.approx([m]) and plane.inertias == pytest.approx([PAPER_TRUCK.yaw_inertia])
     assert (plane.static.sum(), plane.static @ x, plane.static @ y) == pytest.approx((m * GRAVITY, 0.0, 0.0), abs=1e-8)
     assert (plane.by_x.sum(), plane.by_x @ x, plane.by_x @ y) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
     assert (plane.by_y.sum(), plane.by_y @ y, plane.by_y @ x) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
     assert (plane.by_y * y)[:2].sum() == pytest.approx(-0.3 * lever, rel=1e-12)
     assert x == pytest.approx([1.42, 1.42, -2.19, -2.19]) and y == pytest.approx([0.95, -0.95, 0.9, -0.9])
     assert plane.radius == pytest.approx([0.5] * 4) and plane.spin == pytest.approx([13.35, 13.35, 27.0, 27.0])
-    assert PAPER.wheelbase == pytest.approx(3.61, rel=1e-12)
+    assert PAPER_TRUCK.wheelbase == pytest.approx(3.61, rel=1e-12)
 
 
 def test_torque_rises_and_falls_along_the_lines_of_its_own_brake():
@@ -52,8 +52,8 @@ def test_torque_rises_and_falls_along_the_lines_of_its_own_brake():
     )
     one, other = (type(both)(*(column[i : i + 1] for column in both)) for i in (0, 1))
     along = np.array([0.0, 4.0, 1.0])
-    assert torques(along, one) == pytest.approx([0.0, 1500.5 * 3.25, 1800.5 * 0.5], rel=1e-12)
-    assert torques(along, other) == pytest.approx([0.0, 900.5 * 3.75, 990.5 * 0.875], rel=1e-12)
+    assert torques_of_pressures(along, one) == pytest.approx([0.0, 1500.5 * 3.25, 1800.5 * 0.5], rel=1e-12)
+    assert torques_of_pressures(along, other) == pytest.approx([0.0, 900.5 * 3.75, 990.5 * 0.875], rel=1e-12)
 
 
 def test_nothing_is_under_pressure_at_the_start_but_the_supply():
@@ -151,5 +151,5 @@ def test_a_slow_sine_passes_the_band_of_a_score_and_has_its_root_mean_square():
     its warped frequencies is below 1e-4 there."""
     times = 1e-3 * np.arange(20_000)
     passed = low_pass(2.5 * np.sin(2.0 * math.pi * 5.0 * times), 1e-3)[5000:15_000]
-    assert rms(2.5 * np.sin(2.0 * math.pi * 5.0 * times)) == pytest.approx(2.5 / math.sqrt(2.0), rel=1e-12)
+    assert root_mean_square(2.5 * np.sin(2.0 * math.pi * 5.0 * times)) == pytest.approx(2.5 / math.sqrt(2.0), rel=1e-12)
     assert np.sqrt(np.mean(passed**2)) == pytest.approx(2.5 / math.sqrt(2.0) / (1.0 + 3.0**-8), rel=5e-4)

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from models.rail.laid_profiles import Profiles, laid_profile
-from models.rail.profile_contact import _SUMS, NODE, TOUCH, Pose, _add, pressed, profile_on_rail
+from models.rail.profile_contact import (
+    _SUMS,
+    TOUCH,
+    WHEEL_NODE,
+    Pose,
+    _add_node,
+    normal_force_and_axes,
+    profile_on_rail,
+)
 from validation.contact import plain_profile as plain
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -36,10 +44,10 @@ def test_touches_at_random_poses(side):
 
 def test_a_node_between_two_zones_adds_to_both():
     """A factor common to all sums would leave every mean: here they are told. Depth 2e-5 m, slope 3/4, zone 1.3."""
-    node, sums = np.array([(0.01, 0.45, 0.0, 1.3)], NODE), np.zeros(3, _SUMS)
+    node, sums = np.array([(0.01, 0.45, 0.0, 1.3)], WHEEL_NODE), np.zeros(3, _SUMS)
     at = 2e-5, 1e-3, 0.7, 0.44, 0.75, 4
     for _ in range(2):
-        _add(node[0], at, 0.02, sums)
+        _add_node(node[0], at, 0.02, sums)
     for zone, share in ((0, 0.0), (1, 0.7), (2, 0.3)):
         each = np.array([1.0, 2e-5, 0.02, 4e-4, -0.6, 0.8, 1e-3, 0.7, 0.44, 0.45])
         assert sums[zone].tolist() == pytest.approx(2.0 * share * 4e-10 * each, rel=1e-12, abs=0.0)
@@ -48,7 +56,11 @@ def test_a_node_between_two_zones_adds_to_both():
 def test_force_and_axes_of_a_touch():
     draw = np.random.default_rng(2)
     for depth, along, across in 10.0 ** draw.uniform((-6.0, 0.0, 0.0), (-4.0, 2.0, 2.0), (10, 3)):
-        assert pressed(depth, along, across, MODULUS) == pytest.approx(
-            plain.pressed(depth, along, across, MODULUS), rel=1e-10
+        assert normal_force_and_axes(depth, along, across, MODULUS) == pytest.approx(
+            plain.hertz_force(depth, along, across, MODULUS), rel=1e-10
         )
-    assert pressed(0.0, 1.0, 2.0, MODULUS) == pressed(-1e-5, 1.0, 2.0, MODULUS) == (0.0, 0.0, 0.0)
+    assert (
+        normal_force_and_axes(0.0, 1.0, 2.0, MODULUS)
+        == normal_force_and_axes(-1e-5, 1.0, 2.0, MODULUS)
+        == (0.0, 0.0, 0.0)
+    )

@@ -71,7 +71,7 @@ def test_distances_between_the_nodes(name):
 
 def test_the_least_of_a_row_and_its_place():
     row = np.random.default_rng(2).normal(size=20)
-    line = plain.hermite(np.arange(18.0), row)
+    line = plain.hermite_spline(np.arange(18.0), row)
     turning = line.derivative().roots(extrapolate=False)
     places = np.append(turning, line.x)
     k = np.argmin(line(places))
@@ -135,9 +135,9 @@ def test_tractions_of_the_meshes():
     """By the areas in common; a factor common to all of them would leave the fit."""
     draw, box = np.random.default_rng(6), (-4e-3, 5e-3, -3e-3, 3e-3)
     low, high = draw.uniform(-4e-3, 0.0, 7), draw.uniform(1e-3, 5e-3, 7)
-    net = plain.middles(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
+    net = plain.interval_midpoints(*box[2:], 7), low, high, 6e-3 / 7, np.ones((7, 6))
     tractions = draw.normal(size=(7, 6, 2))
-    expected = plain.gathered(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
+    expected = plain.mean_tractions(plain.Strips(*net), tractions[..., 0] + 1j * tractions[..., 1], box, 5)
     assert gather(FineNet(*net), tractions, box, 5) == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 

@@ -12,8 +12,8 @@ from models.vehicles import pitch_plane_equations as equations
 from validation.cases import planted_faults
 from validation.common import checks
 from validation.faults import pitch_plane as case
-from validation.faults.bench import CHECKS, Bench, size
-from validation.faults.planting import CLEAN, FAULTS, planted
+from validation.faults.bench import CHECKS, Bench, size_of_error
+from validation.faults.planting import CONTROLS_WITHOUT_FAULT, FAULTS, planted_builder
 
 
 @pytest.fixture(scope="module")
@@ -87,12 +87,14 @@ def test_the_quick_share_plants_in_every_system_and_says_of_how_many(tmp_path):
 
 @pytest.mark.full
 def test_every_fault_is_caught_in_every_engine_that_has_it(found):
-    assert [name for name, record in found.items() if not case.caught(record)] == []
+    assert [name for name, record in found.items() if not case.is_caught(record)] == []
 
 
 @pytest.mark.full
 def test_the_symmetric_vehicle_hides_exactly_what_symmetry_says(found):
-    assert {name for name, record in found.items() if not case.caught(record, case.SYMMETRIC)} == set(case.HIDDEN)
+    assert {name for name, record in found.items() if not case.is_caught(record, case.SYMMETRIC_SET)} == set(
+        case.HIDDEN_BY_SYMMETRY
+    )
 
 
 @pytest.mark.full
@@ -108,14 +110,16 @@ def test_the_symmetric_vehicle_hides_exactly_what_symmetry_says(found):
     ],
 )
 def test_no_check_is_enough_alone(found, name, blind):
-    assert not case.seen(found[name], blind)
-    assert case.caught(found[name])
+    assert not case.is_seen(found[name], blind)
+    assert case.is_caught(found[name])
 
 
 def test_a_late_read_or_a_held_stage_loses_three_orders():
     """Runge-Kutta of order 4 falls to 1; the check sees the difference of 3."""
     bench = Bench("asymmetric_twin", 0.1)
-    loss = size(CHECKS["order"], bench, "mujoco", planted(fault("road held at the middle stages"), "mujoco"))
+    loss = size_of_error(
+        CHECKS["order"], bench, "mujoco", planted_builder(fault("road held at the middle stages"), "mujoco")
+    )
     assert loss == pytest.approx(3.0, abs=0.2)
 
 
@@ -136,7 +140,7 @@ def test_a_fault_lives_only_while_its_model_works():
     bench = Bench("asymmetric_twin", 0.02)
     for own in FAULTS:
         for engine in own.engines:
-            model = planted(own, engine)(bench.road, bench.settings(engine))
+            model = planted_builder(own, engine)(bench.road, bench.settings(engine))
             assert [getattr(owner, name) for owner, name in watched] == before, own.name
             model.acceleration(0.01, np.zeros(4), np.zeros(4))
     assert [getattr(owner, name) for owner, name in watched] == before
@@ -145,7 +149,10 @@ def test_a_fault_lives_only_while_its_model_works():
 def test_interpreted_equations_are_the_compiled_ones():
     """Faults in the equations are planted into the interpreted reference: without one it is the same to rounding."""
     bench = Bench("asymmetric_twin", 0.1)
-    assert size(CHECKS["road twin"], bench, "reference", planted(CLEAN[1], "reference")) <= 1e-15
+    assert (
+        size_of_error(CHECKS["road twin"], bench, "reference", planted_builder(CONTROLS_WITHOUT_FAULT[1], "reference"))
+        <= 1e-15
+    )
 
 
 def test_a_run_that_fails_is_infinitely_far():
@@ -155,7 +162,7 @@ def test_a_run_that_fails_is_infinitely_far():
         raise checks.RunFailed("nobody", "refused")
 
     assert checks.trajectory_gap(refuses, bench.road, bench.settings("exudyn")) == float("inf")
-    assert size(CHECKS["audit"], bench, "exudyn", refuses) == float("inf")
+    assert size_of_error(CHECKS["audit"], bench, "exudyn", refuses) == float("inf")
 
 
 @pytest.mark.full

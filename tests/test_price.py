@@ -76,7 +76,7 @@ def measured_of(problem):
 
 def with_points(points):
     """The planted problem with these points."""
-    return cost.measured(PlantedProblem(), points)
+    return cost.measured_points(PlantedProblem(), points)
 
 
 def test_order_of_synthetic_curves():
@@ -96,7 +96,7 @@ def test_hollow_points_do_not_enter_the_order():
 
 def test_coinciding_curves_are_named():
     base = {h: h**4 for h in STEPS}
-    found = curves.coinciding(
+    found = curves.coinciding_curves(
         {
             "a": base,
             "b": {h: 1.009 * e for h, e in base.items()},
@@ -199,8 +199,8 @@ def test_parts_of_a_step_from_three_runs():
         "engine": "mujoco",
         "seconds": {run: (total * seconds * noise).tolist() for run, total in runs},
     }
-    assert split.parts(saved) == pytest.approx([4.4, 1.1, 5.5])
-    assert split.share(saved) == pytest.approx((10, 10, 10))
+    assert split.step_parts(saved) == pytest.approx([4.4, 1.1, 5.5])
+    assert split.bridge_share(saved) == pytest.approx((10, 10, 10))
     assert split.table([saved], "road")[0].rows[0][2:5] == ("4.40", "1.10", "5.50")
     assert split.table([saved], "wheel") == []
 
@@ -221,7 +221,7 @@ def test_a_wrong_order_fails_its_row():
 def test_what_a_default_loses():
     """1e-3 N: first order needs 1000 times 125 calls, fourth order 1000^(1/4) times 500: 44.5 times."""
     found = measured_of(PlantedProblem()).loss(1e-3, "force calls", "exudyn first")
-    assert found.how == "extrapolated"
+    assert found.origin == "extrapolated"
     assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
     assert found.low == found.high == found.factor, "counts have no interval"
 
@@ -265,7 +265,7 @@ def test_rounds_are_for_settings_that_decide_something():
             replace(p, setting=replace(p.setting, method="third"), seconds=(longer * p.cost("seconds"),))
             for p in fourth
         ]
-        chosen = {p.setting.curve for p in with_points(points + third).racing()}
+        chosen = {p.setting.curve for p in with_points(points + third).points_to_time()}
         assert {"exudyn fourth", "exudyn first"} <= chosen
         assert ("exudyn third" in chosen) == expected
 
@@ -348,11 +348,11 @@ def test_description_of_seconds():
 
 def test_force_calls_seen_from_outside():
     """Each adapter's counts against MuJoCo's timers and Exudyn's own calls of a load, 50 steps each."""
-    from models.systems.pitch_plane.scene import assemble
-    from validation.price.force_calls import counted
+    from models.systems.pitch_plane.scene import assembly_of_scene
+    from validation.price.force_calls import counted_calls
     from validation.price.problems.road_excited import scene, setting, settings_of
 
-    assembly = assemble(scene())
+    assembly = assembly_of_scene(scene())
     for engine, method, stages in (
         ("mujoco", "RK4", 4),
         ("mujoco", "Euler", 1),
@@ -360,8 +360,13 @@ def test_force_calls_seen_from_outside():
         ("exudyn", "RK67", 7),
         ("exudyn", "VelocityVerlet", 1),
     ):
-        assert counted(engine, assembly, settings_of(setting(engine, method, 1e-3), 0.05)) == (50 * stages, 50 * stages)
-    outside, said = counted("exudyn", assembly, settings_of(setting("exudyn", "GeneralizedAlpha 0.9", 1e-3), 0.05))
+        assert counted_calls(engine, assembly, settings_of(setting(engine, method, 1e-3), 0.05)) == (
+            50 * stages,
+            50 * stages,
+        )
+    outside, said = counted_calls(
+        "exudyn", assembly, settings_of(setting("exudyn", "GeneralizedAlpha 0.9", 1e-3), 0.05)
+    )
     assert outside == said > 50
 
 
@@ -381,12 +386,12 @@ def test_defaults_are_those_of_the_installed_engines():
     import exudyn
     import mujoco
 
-    from models.advice.price.systems.pitch_plane import RADII
+    from models.advice.price.systems.pitch_plane import SPECTRAL_RADII
     from validation.price.problems.road_excited import DEFAULTS
 
     ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
     assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"
-    assert RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
+    assert SPECTRAL_RADII["GeneralizedAlpha 0.9"] == ti.generalizedAlpha.spectralRadius
     assert DEFAULTS["mujoco", "Euler", option.timestep] == "MuJoCo"
     assert option.integrator == mujoco.mjtIntegrator.mjINT_EULER
 
@@ -394,12 +399,12 @@ def test_defaults_are_those_of_the_installed_engines():
 def test_every_force_in_one_callback_gives_the_native_path():
     from models.engines.assembly import Settings
     from models.engines.protocol import build
-    from models.systems.pitch_plane.scene import assemble
-    from validation.common.scenes import VEHICLES, road_scene
+    from models.systems.pitch_plane.scene import assembly_of_scene
+    from validation.common.scenes import VEHICLE_SETS, road_scene
     from validation.price.compiled_forces import CompiledForces
 
     settings = Settings("RK4", 1e-3, 0.5)
-    for parameters in VEHICLES:
-        assembly = assemble(road_scene(parameters, duration=0.5))
+    for parameters in VEHICLE_SETS:
+        assembly = assembly_of_scene(road_scene(parameters, duration=0.5))
         native = build("mujoco", assembly, settings).run().states
         assert np.abs(CompiledForces(assembly, settings).run() - native).max() < 1e-12

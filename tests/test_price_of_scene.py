@@ -11,7 +11,7 @@ from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import priced_scene
-from models.advice.price.text import as_dict, lines
+from models.advice.price.text import as_dict, recommendation_lines
 from models.advice.price.truth import values_at
 from models.core.assumptions import Assumption, with_assumptions
 from models.core.errors import InputError, RunFailed
@@ -118,14 +118,14 @@ def test_nothing_is_recommended_that_breaks_an_assumption_which_the_reference_ke
     assert best.tried.setting.value == 0.0125 and best.error == pytest.approx(1e3 * 0.0125**4, rel=1e-3)
     flagged = [one for one in found.tried if one.status == "flagged"]
     assert {one.setting.value > 0.02 for one in flagged} == {True} and "tyres press" in flagged[0].reason
-    assert any("flagged" in line and "tyres press" in line for line in lines(found))
+    assert any("flagged" in line and "tyres press" in line for line in recommendation_lines(found))
     assert as_dict(found)["broken assumptions"] == []
 
 
 def test_what_every_setting_breaks_is_told_and_forbids_none():
     found = recommend(Lifting(always=True), 1e-2)
     assert found.winners["exudyn", "calls"].tried.setting.value == 0.05
-    assert any("with every setting: assumption broken: tyres press" in line for line in lines(found))
+    assert any("with every setting: assumption broken: tyres press" in line for line in recommendation_lines(found))
     assert as_dict(found)["broken assumptions"][0]["remedy"] == "name lift_off"
 
 
@@ -161,7 +161,7 @@ def test_a_recommendation_holds_beside_another_solver():
     for one in found.winners.values():
         assert true_errors(scene, [one.tried.setting])[one.tried.setting] == pytest.approx(one.error, rel=0.2)
         assert one.error <= 0.5
-    text = "\n".join(lines(found))
+    text = "\n".join(recommendation_lines(found))
     assert "f1 and f2 within 0.5 N" in text and "[engines.mujoco]" in text
     assert as_dict(found)["cheapest"][0]["error"] == found.winners["", "seconds"].error
 
@@ -218,4 +218,4 @@ def test_an_integrator_of_ones_own_is_priced_by_its_tolerance():
     best = found.winners["", "seconds"]
     assert best.tried.setting.adaptive and 0.0 < best.error <= 0.5
     assert len({one.setting.value for one in found.tried}) > 1
-    assert f"    # twinrig run SCENE --engine {name}" in lines(found)
+    assert f"    # twinrig run SCENE --engine {name}" in recommendation_lines(found)

@@ -7,11 +7,11 @@ import pytest
 
 from models.advice.price.meshed import MeshedScene, first_part
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import price, priced, recommend
-from models.advice.price.text import lines
+from models.advice.price.recommendation import price, priced_scene, recommend
+from models.advice.price.text import recommendation_lines
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, load
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 
 STOP = {
     "title": "a stop",
@@ -36,7 +36,7 @@ def scene_of(table):
 
 
 def own(table, quantity=None, engines=("reference",)):
-    return priced(scene_of(table), quantity, engines)
+    return priced_scene(scene_of(table), quantity, engines)
 
 
 @pytest.mark.full
@@ -48,7 +48,7 @@ def test_a_stop_is_held_to_its_tolerance_with_as_few_steps_as_that_takes():
     exact = found.scene.answer(found.scene.solve(Setting("reference", "exact wheel", 5.5e-3 / 500, 1), 30.0))
     # 500 substeps, none of the search's own: what is left is the error of the truth, 1/20 of the tolerance or less
     assert found.truth.error(exact) < 1e-6 and best.error <= 1e-5
-    text = "\n".join(lines(found))
+    text = "\n".join(recommendation_lines(found))
     assert "substeps = " in text and "procedure turned; of another one by --quantity ahead.stopping_distance" in text
 
 
@@ -56,7 +56,7 @@ def test_a_path_with_linear_creep_is_held_by_steps_alone():
     scene = own(PATHS)
     found = recommend(scene, 1e-9)
     assert found.winners["", "calls"].error <= 1e-9 and scene.counted == "force calls"
-    assert "DOP853" in found.searched.how  # another family has said the same
+    assert "DOP853" in found.search_truth.origin  # another family has said the same
 
 
 def test_more_cells_come_nearer_and_are_counted():
@@ -93,7 +93,9 @@ def test_what_cannot_be_asked_is_one_message(table, quantity, message):
 
 @pytest.mark.full
 def test_a_tolerance_above_the_quantity_itself_is_doubted():
-    told, quiet = ("\n".join(lines(recommend(own(STOP, "turned.yaw"), tolerance))) for tolerance in (1e3, 1e-3))
+    told, quiet = (
+        "\n".join(recommendation_lines(recommend(own(STOP, "turned.yaw"), tolerance))) for tolerance in (1e3, 1e-3)
+    )
     assert "DOUBT: yaw is at most" in told and "DOUBT" not in quiet
 
 
@@ -112,4 +114,4 @@ def test_a_vehicle_that_does_not_stop_has_no_price():
 )
 def test_systems_without_a_price_of_steps_say_why(name, why):
     with pytest.raises(InputError, match=why):
-        price(load(SCENES / f"{name}.toml"), 1.0, None, ("reference",))
+        price(load(SCENES_FOLDER / f"{name}.toml"), 1.0, None, ("reference",))

@@ -28,10 +28,10 @@ def stack(*calls):
         ([("__init__", "models/engines/free_vehicle_mujoco.py")], "building in mujoco"),
         ([("run", "models/systems/braking/march.py")], profile.BESIDE_ENGINES),
         ([("run", "models/systems/braking/march.py"), ("_moved", "models/engines/exudyn.py")], "marching in exudyn"),
-        ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS),
-        ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS),
-        ([("_figure", "studies/single_run.py"), ("draw", "matplotlib/axes/_axes.py")], profile.FIGURES),
-        ([("save", "models/core/result.py"), ("sort", "numpy/x.py")], profile.SAVING),
+        ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS_KIND),
+        ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS_KIND),
+        ([("_figure", "studies/single_run.py"), ("draw", "matplotlib/axes/_axes.py")], profile.FIGURES_KIND),
+        ([("save", "models/core/result.py"), ("sort", "numpy/x.py")], profile.SAVING_KIND),
     ],
 )
 def test_the_innermost_call_that_tells_decides(calls, part):
@@ -42,7 +42,7 @@ def test_all_the_time_of_the_work_is_told_and_no_more():
     begun = time.perf_counter()
     summary = profile.Watch().told(lambda progress: time.sleep(0.3) or {"table": ["first"]}, None)
     taken, told = time.perf_counter() - begun, summary["profile"]
-    told.pop(profile.BEGIN)
+    told.pop(profile.PYTHON_START_KIND)
     assert 0.25 < sum(told.values()) <= taken and summary["table"][0] == "first"
 
 
@@ -50,6 +50,8 @@ def test_a_run_tells_it_when_it_is_asked_to(twinrig, empty_folder, capsys):
     asked = ("run", "release", "--set", "run.duration=0.05", "--engine", "reference", "--json")
     assert twinrig(*asked, "--profile") == 0
     told = json.loads(capsys.readouterr().out)
-    assert {profile.BEGIN, profile.FIGURES} <= told["profile"].keys() and min(told["profile"].values()) > 0.0
+    assert {profile.PYTHON_START_KIND, profile.FIGURES_KIND} <= told["profile"].keys() and min(
+        told["profile"].values()
+    ) > 0.0
     assert twinrig(*asked) == 0
     assert "profile" not in json.loads(capsys.readouterr().out)

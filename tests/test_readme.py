@@ -3,7 +3,7 @@
 import re
 
 from docs.pages import ROOT, blocks
-from studies.command.asked import studies
+from studies.command.asked import study_names
 
 README = (ROOT / "README.md").read_text()
 
@@ -32,8 +32,8 @@ def test_the_readme_is_short():
 def test_every_study_is_listed_with_its_duration_and_run_by_ci():
     ci = (ROOT / ".ci" / "run").read_text()
     listed = (ROOT / "docs" / "reference" / "studies.md").read_text().splitlines()
-    assert len(studies()) > 25
-    for name in studies():
+    assert len(study_names()) > 25
+    for name in study_names():
         row = next(line for line in listed if f"studies/{name}.py" in line)
         assert re.search(r"\d+ (s|min) \|$", row), row
         assert name in ci
@@ -71,8 +71,8 @@ def test_the_constraints_are_plain_pins():
 
 
 def test_the_effect_of_the_pages_is_one_file(new_file):
-    from validation.absence.of_systems import added_counts, declared
+    from validation.absence.of_systems import added_counts, declared_counts
 
     new_file("handling", "side_wind", of_page("how-to/own_effect.md", "python", "def extend"))
-    assert added_counts("handling", "side_wind", quick=True) == declared("handling", "side_wind", ["mujoco"])
-    assert declared("handling", "side_wind", ["mujoco"]) == {"mujoco": {"pushes": 1}}
+    assert added_counts("handling", "side_wind", quick=True) == declared_counts("handling", "side_wind", ["mujoco"])
+    assert declared_counts("handling", "side_wind", ["mujoco"]) == {"mujoco": {"pushes": 1}}

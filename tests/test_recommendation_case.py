@@ -10,12 +10,12 @@ from models.advice.price import SettingLadder, recommendation
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import recommend
 from models.advice.price.search import Search, TriedSetting
-from models.advice.price.text import as_dict, lines
-from models.advice.price.truth import truth
+from models.advice.price.text import as_dict, recommendation_lines
+from models.advice.price.truth import reference_truth
 from models.core.errors import InputError, RunFailed
 from validation.cases import recommendation as case
 from validation.faults.advice import LOOSE_TOLERANCE, Swing
-from validation.price.unseen import Verdict, slower
+from validation.price.unseen import Verdict, default_is_cheaper
 
 GOOD = Verdict("a scene", "mujoco RK4", "2 ms", 1.0, 0.5, 0.5, 0.01, False)
 
@@ -43,7 +43,7 @@ class Torn(Whole):
 def test_an_engine_that_fails_is_named_and_the_other_one_recommended():
     found = recommend(Torn(), LOOSE_TOLERANCE)
     assert {one.tried.setting.engine for one in found.winners.values()} == {"mujoco"}
-    text = "\n".join(lines(found))
+    text = "\n".join(recommendation_lines(found))
     assert "Exudyn RK4" in text and "the solver gave up" in text
     assert "Infinity" not in json.dumps(as_dict(found)) and json.dumps(as_dict(found), allow_nan=False)
 
@@ -107,7 +107,8 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
     )
     forgot = recommend(Whole(), LOOSE_TOLERANCE)
     said = [
-        any(slower(own, key, one) for key, one in own.winners.items() if key[1] == "calls") for own in (whole, forgot)
+        any(default_is_cheaper(own, key, one) for key, one in own.winners.items() if key[1] == "calls")
+        for own in (whole, forgot)
     ]
     assert said == [False, True]
 
@@ -115,7 +116,7 @@ def test_a_default_that_the_race_forgot_is_seen_by_the_verdict(monkeypatch):
 def test_a_run_of_minutes_is_not_made_where_the_tolerance_is_met_in_less():
     own = Whole()
     quick = TriedSetting(Setting("reference", "RK4", 0.1, 4), "ok", "", 0.0, 80, 0.1)
-    search = Search(own, truth(own, LOOSE_TOLERANCE, own.whole), LOOSE_TOLERANCE, own.whole, [quick])
+    search = Search(own, reference_truth(own, LOOSE_TOLERANCE, own.whole), LOOSE_TOLERANCE, own.whole, [quick])
     rough = TriedSetting(Setting("mujoco", "Euler", 0.2, 1), "ok", "", 10 * LOOSE_TOLERANCE, 10, 8.0)
     ladder = own.ladders()[2]
     assert not search._too_long(ladder, 0, rough)  # 8 s

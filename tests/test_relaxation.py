@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from models.brake.controller import AllApplied
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.relaxation import DAMPING, Lag, lag_on, longest_step, taken_up
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad
-from models.systems.braking.procedures import ready
+from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import marched_by
 from models.systems.braking.scene import build
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import stacked_tables
 from validation.braking import plain_sprung as whole
 from validation.cases import braking_relaxation as case
 
@@ -42,7 +42,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
             "procedures": {"j": {"kind": "j_turn", "speed": 9.0, "steer": steer}},
         }
     )
-    vehicle, start = ready(scene, "j")
+    vehicle, start = vehicle_and_start(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
     return marched_by(vehicle, engine).run(AllApplied(4), start, duration)
@@ -51,7 +51,9 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference")
 def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():
     without, little, much = stop(), stop(0.01), stop(0.8)
     y = [path.states[-1, 0, 1] for path in (without, little, much)]
-    assert all(path.stands and not path.states[-1, 1].any() for path in (without, little, much))  # at rest, exactly
+    assert all(
+        path.ended_at_rest and not path.states[-1, 1].any() for path in (without, little, much)
+    )  # at rest, exactly
     # of 3 m, 1 cm of lag changes 0.2 mm and 80 cm 14 mm
     assert y[1] == pytest.approx(y[0], abs=5e-4) and 0.005 < abs(y[2] - y[0]) < 0.05
     assert abs(much.states[9, 1, 2]) < 0.9 * abs(without.states[9, 1, 2])  # yaw rate builds up later
@@ -66,9 +68,12 @@ def test_the_step_is_of_second_order():
 
 def test_it_damps_at_rest():
     # a wheel's share of a mass on its tyre alone, at rest along it and pushed aside at 0.3 m/s
-    plane, slope, step = truck(PAPER), surface("ice").cornering, 5.5e-3
+    plane, slope, step = plane_of_truck(PAPER_TRUCK), table_of_surface("ice").cornering, 5.5e-3
     lag, lagging, state = Lag(np.full(4, 0.3), np.zeros(4)), np.zeros(4), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
-    vehicle, way = OnRoad(plane, np.zeros(4, dtype=int), slope, stacked([surface("ice")]), UNIFORM_ROAD), 0.0
+    vehicle, way = (
+        OnRoad(plane, np.zeros(4, dtype=int), slope, stacked_tables([table_of_surface("ice")]), UNIFORM_ROAD),
+        0.0,
+    )
     for _ in range(round(2.0 / step)):
         for half in (True, False):
             lag_on(state, 0.5 * step, np.zeros(4), vehicle, lag, lagging)

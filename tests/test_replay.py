@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from validation.replay import __main__ as replay
-from validation.replay.answers import CommandAnswer, answer, difference, load, save
-from validation.replay.jobs import ReplayJob, jobs
+from validation.replay.answers import CommandAnswer, answer_difference, answer_of_job, load, save
+from validation.replay.jobs import ReplayJob, replay_jobs
 
 COMMAND = """#!{python}
 import json, sys
@@ -59,10 +59,10 @@ def test_a_recording_that_was_begun_goes_on(tmp_path, capsys):
 def test_channels_that_vanish_move_or_are_renamed():
     before = CommandAnswer([0], "", 1.0, {"a.nc: x": np.ones(3), "b.csv: y": np.ones(3)})
     moved = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3)})
-    told = difference(before, moved, 0.0, {})
+    told = answer_difference(before, moved, 0.0, {})
     assert told.wrong == ["b.csv: y is gone"] and not told.tolerated
     named = CommandAnswer([0], "", 1.0, {"c.nc: x": np.ones(3), "c.nc: z": np.ones(3)})
-    assert not difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
+    assert not answer_difference(before, named, 0.0, {"b.csv: y": "c.nc: z"}).wrong
 
 
 @pytest.mark.parametrize(
@@ -81,8 +81,8 @@ def test_every_bit_counts(tmp_path, now):
     array = np.array([0.0, 1.0, np.inf, np.nan])
     save(tmp_path, "a", CommandAnswer([0], "", 1.0, {"a.nc: x": array}))
     kept = load(tmp_path, "a")
-    assert not difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
-    assert difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
+    assert not answer_difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": array}), 0.0, {}).wrong
+    assert answer_difference(kept, CommandAnswer([0], "", 1.0, {"a.nc: x": now}), 0.0, {}).wrong
 
 
 def test_a_bound_is_of_the_largest_number_and_of_every_number():
@@ -90,19 +90,19 @@ def test_a_bound_is_of_the_largest_number_and_of_every_number():
     nudged = large.copy()
     nudged[12_345] += 1e-8
     before, now = (CommandAnswer([0], "", 1.0, {"a.nc: x": values}) for values in (large, nudged))
-    assert difference(before, now, 1e-12, {}).wrong and not difference(before, now, 2e-11, {}).wrong
+    assert answer_difference(before, now, 1e-12, {}).wrong and not answer_difference(before, now, 2e-11, {}).wrong
     none = CommandAnswer([0], "", 1.0, {"a.nc: x": np.where(large == 0.0, np.nan, large)})
-    assert difference(before, none, 1.0, {}).wrong and difference(none, before, 1.0, {}).wrong
+    assert answer_difference(before, none, 1.0, {}).wrong and answer_difference(none, before, 1.0, {}).wrong
 
 
 def test_what_a_machine_decides_is_no_part_of_an_answer(tmp_path):
-    now = answer(ReplayJob("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
+    now = answer_of_job(ReplayJob("both", (("show", "alone"), ("run",))), str(stub(tmp_path)), tmp_path / "work")
     assert now.message == "a plan, made in SECONDS\n" and now.codes == [0, 0]
     assert set(now.arrays) == {"out/path.csv: time [s]", "out/path.csv: x [m]", ": 1/scene", ": 1/answer/largest x [m]"}
 
 
 def test_the_same_seed_draws_the_same_scenes_of_every_system(tmp_path):
-    one, other = (jobs(str(stub(tmp_path))) for _ in range(2))
+    one, other = (replay_jobs(str(stub(tmp_path))) for _ in range(2))
     assert one == other and len({job.name for job in one}) == len(one)
     varied = [job for job in one if job.name[-3:].isdigit()]
     systems = {line for job in varied for line in job.scene.splitlines() if line.startswith("system")}

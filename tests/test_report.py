@@ -14,12 +14,12 @@ import pytest
 
 from models.core.errors import InputError
 from validation.cases import point_mass
-from validation.common.changes import changes
+from validation.common.changes import changed_rows
 from validation.common.changes import read_results as read_earlier
-from validation.common.rows import STATUSES, Observed, Row, behaves, not_run
+from validation.common.rows import STATUSES, Observed, Row, behaviour_row, not_run
 from validation.report import page as report
 from validation.report import shares
-from validation.report.numbers import error, margin, number, numeric_columns, powers, share
+from validation.report.numbers import error, margin_of_row, number_markup, numeric_columns, powers_markup, share_markup
 from validation.run import save as _save
 from validation.run import say
 
@@ -36,7 +36,7 @@ def rows() -> list[Row]:
         ),
         Observed("audit.exudyn.twin", "pitch-plane", "acceleration", 2.5e-16, "1").at_most(1e-12, "rounding", "native"),
         FAILED,
-        behaves("guards.nan", "hard-cases", ODD, "raised", "raised", ODD),
+        behaviour_row("guards.nan", "hard-cases", ODD, "raised", "raised", ODD),
         Observed("drift.noisy", "drift", "drift-off", 8.4, "s").beside("about 10", "one sample"),
         not_run("roads.measured", "pitch-plane", "measured roads", "no folder named"),
         Row("odd.<b>", "effects", "a case that nobody knows", None, "", "", None, "", "none", "failed", ODD),
@@ -169,15 +169,15 @@ def test_a_quick_report_tells_its_share_of_the_last_full_one(folder, tmp_path, m
     results = report.read(folder / "results.json")
     results["rows"] = results["rows"][:3]
     results["provenance"]["quick"] = False
-    shares.full.cache_clear()
-    line = shares.shares(results)[0]
+    shares.full_report_data.cache_clear()
+    line = shares.shares_of_systems(results)[0]
     assert (line["rows"], line["seconds"], line["full_rows"], line["full_seconds"]) == (3, 400.0, None, None)
     (folder / "results.json").write_text(json.dumps(results))
     shares.keep(folder)
-    shares.full.cache_clear()
-    line = shares.shares(results)[0]
+    shares.full_report_data.cache_clear()
+    line = shares.shares_of_systems(results)[0]
     assert (line["full_rows"], line["full_seconds"]) == (3, 400.0), "audit has two of the rows, order one and not seven"
-    shares.full.cache_clear()
+    shares.full_report_data.cache_clear()
 
 
 def test_missing_and_damaged_data_still_give_a_page(folder):
@@ -249,7 +249,7 @@ def test_every_parameter_has_its_unit_and_source(page):
     ],
 )
 def test_numbers_read_as_an_engineer_writes_them(value, text):
-    assert number(value) == text
+    assert number_markup(value) == text
 
 
 @pytest.mark.parametrize(
@@ -260,16 +260,16 @@ def test_errors_beyond_plain_numbers_are_told_by_their_size(value, text):
 
 
 def test_margin_needs_numbers_and_a_tolerance():
-    assert margin(rows()[0].as_dict()) == pytest.approx(0.07 / 0.15)
-    assert margin(rows()[3].as_dict()) is None
-    assert margin(Observed("a.b", "cost", "q", 1, "").within(1, 0, "w", "none").as_dict()) is None
+    assert margin_of_row(rows()[0].as_dict()) == pytest.approx(0.07 / 0.15)
+    assert margin_of_row(rows()[3].as_dict()) is None
+    assert margin_of_row(Observed("a.b", "cost", "q", 1, "").within(1, 0, "w", "none").as_dict()) is None
 
 
 def test_shares_and_powers():
-    assert [share(x) for x in (0.0, 0.5, 1e-9, None, float("nan"))] == ["0 %", "50 %", "&lt; 0.01 %", "–", "–"]
-    assert share(3e9) == "3e9 times"
-    assert powers("within 2e-06 of it") == "within 2e-6 of it" and powers("1.7e+02") == "170"
-    assert powers("exudyn-1e5x") == "exudyn-1e5x", "a name is no number"
+    assert [share_markup(x) for x in (0.0, 0.5, 1e-9, None, float("nan"))] == ["0 %", "50 %", "&lt; 0.01 %", "–", "–"]
+    assert share_markup(3e9) == "3e9 times"
+    assert powers_markup("within 2e-06 of it") == "within 2e-6 of it" and powers_markup("1.7e+02") == "170"
+    assert powers_markup("exudyn-1e5x") == "exudyn-1e5x", "a name is no number"
 
 
 def test_columns_of_numbers_go_to_the_right():
@@ -333,7 +333,7 @@ def test_rows_that_an_older_report_called_passed_without_judging_them_are_report
         if row["status"] == "reported":
             row |= {"status": "passed", "reason": "reported, not judged"}
     (folder / "old.json").write_text(json.dumps(found))
-    assert changes(read_earlier(folder / "old.json")["rows"], {row.id: row.as_dict() for row in rows()}) == []
+    assert changed_rows(read_earlier(folder / "old.json")["rows"], {row.id: row.as_dict() for row in rows()}) == []
     assert report.read(folder / "old.json")["rows"] == [row.as_dict() for row in rows()]
 
 
@@ -343,7 +343,7 @@ def test_what_nothing_independent_notices_stands_under_what_is_not_covered_by_na
     from validation.blind_spots.table import Line, write
     from validation.report.blind_spots import blind_spots
 
-    seen = Line("models.tyre.bristles:_mix", "whole", 3, 0, "handling.a", "", "handling.a", "abc1234")
+    seen = Line("models.tyre.bristles:_blend_directions", "whole", 3, 0, "handling.a", "", "handling.a", "abc1234")
     unseen = Line(
         "models.tyre.bristles:tyre_forces", "whole", 3, 1, "handling.b", "tests/test_a.py::test_b", "", "abc1234"
     )
@@ -355,7 +355,7 @@ def test_what_nothing_independent_notices_stands_under_what_is_not_covered_by_na
         re.findall(r"<summary>\d+ shared functions? (?:is|are) ([^<]*)</summary>(.*?)</details>", gaps, re.DOTALL)
     )
     independent, unaudited = folds["noticed by nothing independent"], folds["not audited"]
-    assert "models.tyre.bristles:tyre_forces" in independent and "models.tyre.bristles:_mix" not in gaps
+    assert "models.tyre.bristles:tyre_forces" in independent and "models.tyre.bristles:_blend_directions" not in gaps
     assert "models.tyre.bristles:_creepages" in unaudited
     section = page[page.index('<section id="blind-spots"') : page.index('<section id="assumptions"')]
     assert "commit abc1234" in section and "test_a.py::test_b" in section and "2 of 3" in section

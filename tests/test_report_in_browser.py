@@ -7,7 +7,7 @@ import pytest
 from browser import browser, tab
 
 from validation.cases import CASES, point_mass
-from validation.common.rows import Observed, Row, failed, not_run
+from validation.common.rows import Observed, Row, failed_row, not_run
 from validation.report.page import write
 from validation.run import save
 
@@ -52,8 +52,8 @@ def rows() -> list[Row]:
         for engine in ("exudyn", "mujoco")
     ]
     odd = [
-        failed("audit.broken", "The case of the audit ends", "the engine stopped"),
-        failed(f"twin.{LONG}", LONG, LONG),
+        failed_row("audit.broken", "The case of the audit ends", "the engine stopped"),
+        failed_row(f"twin.{LONG}", LONG, LONG),
         not_run("roads.measured", "pitch-plane", "The measured road is read", LONG),
         Observed("order.aim", "cost", "Seconds of one call", 7.25, "us").aim(5.0, LONG),
     ]

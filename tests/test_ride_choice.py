@@ -9,25 +9,25 @@ import xarray
 
 from models.advice.ride_choice.choose import Chooser
 from models.advice.ride_choice.march import March
-from models.advice.ride_choice.marched import confirms, marched
+from models.advice.ride_choice.marched import comparison_of_steps, confirms_step
 from models.advice.ride_choice.modes import stable_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
 from models.advice.ride_choice.parameters import scaled_vehicle
 from models.advice.ride_choice.reduced import FullScene
-from models.advice.ride_choice.screen import Screen, confirmed
+from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.errors import InputError
 from models.engines.spatial_protocol import build as build_engine
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import ReducedScene, illegal, without
+from models.systems.ride.reduced_scene import ReducedScene, reduced_without, refusal_reason
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from validation.choice.judged import measured_step, worst_nearby
 from validation.choice.sampled import Sampled
-from validation.ride.drawn_rides import drawn
+from validation.ride.drawn_rides import drawn_ride
 
 SPEED = 20.0
 
@@ -47,17 +47,19 @@ def named(scene):
 
 def deviations(scene, *names):
     own = named(scene)
-    return stationary(FullScene(scene, SPEED).reduced(without(scene, [own[name] for name in names])).system).deviation
+    return stationary_covariance(
+        FullScene(scene, SPEED).reduced(reduced_without(scene, [own[name] for name in names])).system
+    ).deviation
 
 
 def of_vehicle(scene, vehicle):
-    return stationary(excited(linearise(vehicle), scene.excitation(), SPEED)).deviation
+    return stationary_covariance(vehicle_with_road(linearise(vehicle), scene.excitation(), SPEED)).deviation
 
 
 def test_nothing_left_out_is_the_system_itself():
     scene = held("seven_freedoms", 100.0)
     whole = FullScene(scene, SPEED)
-    own = excited(whole.linear, whole.excitation, SPEED)
+    own = vehicle_with_road(whole.linear, whole.excitation, SPEED)
     assert np.abs(whole.full.system.A - own.A).max() < 1e-11 * np.abs(own.A).max()
     assert np.abs(whole.full.left @ whole.full.T - np.eye(len(own.A))).max() < 1e-12
 
@@ -74,7 +76,7 @@ def test_wheels_without_mass_are_the_limit_of_light_ones(name, small):
 
 
 def test_rigid_springs_and_locked_freedoms_are_limits():
-    drew = drawn(2)  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
+    drew = drawn_ride(2)  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
     tyres = tuple(replace(tyre, damping=0.0) for tyre in drew.scene.vehicle.tyres)
     one = replace(drew, scene=replace(drew.scene, vehicle=replace(drew.scene.vehicle, tyres=tyres)))
     own = named(one.scene)
@@ -109,29 +111,29 @@ def test_what_saves_no_calls_stays():
     mass = named(scene)["mass of all wheels"]
     chooser = Chooser(scene, [SPEED], ["travel front left"], 0.3)
     choice = chooser.choose()
-    assert chooser.holds(chooser.confirm(frozenset([mass]))) and not choice.left_out
+    assert chooser.holds(chooser.confirmed_changes(frozenset([mass]))) and not choice.left_out
     assert chooser.cost(frozenset([mass])).calls > chooser.cost(frozenset()).calls
-    assert choice.after == choice.before
+    assert choice.cost_after == choice.cost_before
 
 
 def test_identity_and_screen_of_a_small_change():
     scene = held("seven_freedoms", 50.0)
     whole, rows = FullScene(scene, SPEED), [0, 2, 4]
     screen, effect = Screen(whole.full, rows), named(scene)["tyre damping"]
-    rest = whole.reduced(without(scene, [effect]))
-    two, one = screen.identity(rest)
+    rest = whole.reduced(reduced_without(scene, [effect]))
+    two, one = screen.certificate_sides(rest)
     assert np.abs(two / one - 1).max() < 1e-12
-    full = screen.solved.variance.astype(float)
-    predicted, true = (np.sqrt(v / full) - 1 for v in (screen.predicted(rest), confirmed(rest, rows)))
+    full = screen.extended_solution.variance.astype(float)
+    predicted, true = (np.sqrt(v / full) - 1 for v in (screen.predicted_variances(rest), exact_variances(rest, rows)))
     assert np.all((predicted / true > 0.9) & (predicted / true < 1.1)) and np.all(true > 1e-3)
 
 
 def test_wheel_mass_needs_the_tyre_damper_and_says_so():
     own = named(held(tyre_damping=100.0))
     mass, damper = own["mass of all wheels"], own["tyre damping"]
-    assert "leave out tyre damping, too" in illegal([mass]) and not illegal([mass, damper])
-    assert not illegal([named(held())["mass of all wheels"]])
-    assert "cannot be left out beside" in illegal([mass, damper, own["mass of the wheels of axle 1"]])
+    assert "leave out tyre damping, too" in refusal_reason([mass]) and not refusal_reason([mass, damper])
+    assert not refusal_reason([named(held())["mass of all wheels"]])
+    assert "cannot be left out beside" in refusal_reason([mass, damper, own["mass of the wheels of axle 1"]])
 
 
 def test_stable_step_of_runge_kutta():
@@ -162,7 +164,7 @@ def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding()
         {
             "title": "t",
             "system": "ride",
-            "vehicle": {"file": str(SCENES / "vehicles/pitch_plane.toml")},
+            "vehicle": {"file": str(SCENES_FOLDER / "vehicles/pitch_plane.toml")},
             "road": {"front_rear": "equal"},
             "speeds": {"values": [SPEED]},
         },
@@ -215,11 +217,11 @@ def test_a_quantity_that_is_none(twinrig, capsys):
 
 def test_rounding_is_not_taken_for_white_noise():
     """Wheels without mass on rigid bushings: no noise of the road reaches the body, but 1e-18 of it by rounding."""
-    drew = drawn(38, 0.02)
+    drew = drawn_ride(38, 0.02)
     own = Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
-    assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.within_tolerance
+    assert choice.predicted_change == pytest.approx(choice.confirmed_change, rel=0.2) and choice.within_tolerance
 
 
 def test_options_of_copies_are_refused_where_a_vehicle_is_linear(twinrig, capsys):
@@ -237,21 +239,23 @@ def test_a_tolerance_that_nothing_keeps_leaves_everything_and_says_what_would_ch
 
 def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
     """Neither what a sound certificate lets go nor any other set is reported as left out."""
-    drew, exact = drawn(38, 0.02), Screen.identity
+    drew, exact = drawn_ride(38, 0.02), Screen.certificate_sides
 
     def chooser():
         return Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
 
     sound = frozenset(chooser().choose().left_out)
-    monkeypatch.setattr(Screen, "identity", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1]))
+    monkeypatch.setattr(
+        Screen, "certificate_sides", lambda own, rest: (exact(own, rest)[0] * (1 + 3e-12), exact(own, rest)[1])
+    )
     doubtful = chooser()
     assert sound and not doubtful.choose().left_out
-    assert sound in doubtful.uncertified and not doubtful.within_tolerance(sound)
+    assert sound in doubtful.uncertified_sets and not doubtful.within_tolerance(sound)
 
 
 def drawn_speeds(seed):
     """A scene of a detailed vehicle, with what its choice leaves out as far as the tolerance of 2 % allows."""
-    drew = drawn(seed, 0.02)
+    drew = drawn_ride(seed, 0.02)
     chooser = Chooser(drew.scene, [0.7 * drew.speed, drew.speed, 1.3 * drew.speed], drew.quantities, drew.tolerance)
     return chooser, chooser.choose()
 
@@ -262,16 +266,18 @@ def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
     assert (
         chosen
         and choice.within_tolerance
-        and abs(choice.off).max() > abs(choice.between).max() >= abs(choice.confirmed).max()
+        and abs(choice.change_with_parameters_off).max()
+        > abs(choice.change_between_speeds).max()
+        >= abs(choice.confirmed_change).max()
     )
-    assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.off).max() / 0.02
+    assert 0.3 < worst_nearby(chooser, chosen, 6, 1) <= abs(choice.change_with_parameters_off).max() / 0.02
     saving = measured_step(chooser, chosen) / measured_step(chooser, frozenset())
-    assert saving == pytest.approx(choice.before.calls / choice.after.calls, rel=0.02)
+    assert saving == pytest.approx(choice.cost_before.calls / choice.cost_after.calls, rel=0.02)
 
 
 def test_spectra_near_a_scene_are_those_of_the_exact_solve():
-    drew = drawn(2)
-    rest = without(drew.scene, [named(drew.scene)["springs of part on body"]])
+    drew = drawn_ride(2)
+    rest = reduced_without(drew.scene, [named(drew.scene)["springs of part on body"]])
     rows = [[output.name for output in drew.scene.vehicle.outputs].index(name) for name in drew.quantities]
     near = Neighbourhood(drew.scene, np.array([10.0, 30.0]), [(row, "") for row in rows])
     corner = near.corners(rest)[0]
@@ -280,7 +286,7 @@ def test_spectra_near_a_scene_are_those_of_the_exact_solve():
         for i in (0, len(near.speeds) // 2):
             full, left = (replace(one, vehicle=scaled_vehicle(one.vehicle, factors)) for one in (drew.scene, rest))
             whole = FullScene(full, float(near.speeds[i]))
-            exact = np.sqrt(confirmed(whole.reduced(left), rows) / confirmed(whole.full, rows)) - 1
+            exact = np.sqrt(exact_variances(whole.reduced(left), rows) / exact_variances(whole.full, rows)) - 1
             assert found[i] == pytest.approx(exact, abs=2e-4)  # what the panels leave
     assert abs(near.changes(rest, corner)[:, 0]).max() > abs(near.changes(rest)[:, 0]).max()
 
@@ -289,11 +295,11 @@ def test_a_run_does_what_the_closed_form_of_runs_says():
     """Steps of 80 % of the stable one change deviations by per cents; a planted 10 % longer step is seen."""
     scene = held("half_car", cutoff=50.0)
     march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
-    step = 0.8 * march.longest
-    assert confirms(march, step)
-    run = marched(march, step)
+    step = 0.8 * march.longest_stable_step
+    assert confirms_step(march, step)
+    run = comparison_of_steps(march, step)
     wrong = march.deviations(1.1 * step) / march.deviations(step / 4)
-    assert (abs(run.ratio - wrong) > 4 * run.error).any()
+    assert (abs(run.deviation_ratio - wrong) > 4 * run.error).any()
 
 
 @pytest.mark.parametrize(
@@ -306,7 +312,7 @@ def test_two_closed_forms_of_runs_agree(road):
     scene = held("half_car", tyre_damping=300.0, **road)
     march = March(FullScene(scene, SPEED).full, SPEED, (0, 2), ())
     for share in (0.9, 0.2):
-        step = share * march.longest
+        step = share * march.longest_stable_step
         assert Sampled(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
     late = replace(march, reduced=replace(march.reduced, excitation=further(march.reduced.excitation)))
     if scene.ride.road.front_rear == "delayed":
@@ -323,7 +329,7 @@ def test_the_reduced_vehicle_runs_as_it_stands(twinrig, capsys, empty_folder):
     assert twinrig("run", "ride_choice", "--out", "out", "--json") == 0
     changes = json.loads(capsys.readouterr().out)["answer"]["errors"]
     assert twinrig("run", "out/reduced.toml", "--out", "left", "--json") == 0
-    scene = SCENES / "vehicles" / "pitch_plane.toml"
+    scene = SCENES_FOLDER / "vehicles" / "pitch_plane.toml"
     (empty_folder / "whole.toml").write_text(f"""title = "w"
 system = "ride"
 [vehicle]
@@ -346,14 +352,14 @@ values = [20.0]
     ],
 )
 def test_limits_of_parts_that_a_vehicle_has_not(table, said, empty_folder):
-    text = (SCENES / "vehicles" / "pitch_plane.toml").read_text()
+    text = (SCENES_FOLDER / "vehicles" / "pitch_plane.toml").read_text()
     (empty_folder / "mine.toml").write_text(f"{text}\n[reduced]\n{table}\n")
     with pytest.raises(InputError, match=said):
         load_vehicle("mine.toml", empty_folder, reduced=True)
 
 
 def test_a_reduced_vehicle_is_refused_where_it_would_be_read_as_a_whole_one(empty_folder):
-    text = (SCENES / "vehicles" / "pitch_plane.toml").read_text()
+    text = (SCENES_FOLDER / "vehicles" / "pitch_plane.toml").read_text()
     (empty_folder / "mine.toml").write_text(f'{text}\n[reduced]\nmassless = ["front wheel"]\n')
     with pytest.raises(InputError, match="only the study ride"):
         load_vehicle("mine.toml", empty_folder)

@@ -13,7 +13,7 @@ from models.advice.choice.systems.ride import opened
 from models.advice.choice.variants import Variants
 from models.advice.price import effects
 from models.advice.price.effects import price_list
-from models.advice.price.effects_text import lines
+from models.advice.price.effects_text import price_list_lines
 from models.advice.ride_choice.in_time import FEWEST_COPIES, reduced_vehicle
 from models.core.errors import InputError
 from models.ride.statistical_linearisation import nonlinear_springs
@@ -61,10 +61,12 @@ def test_a_change_that_is_the_same_in_all_samples_is_sure_and_nothing_left_is_al
 
 def test_longer_steps_meet_the_same_roads():
     whole = opened(quarter_car())
-    pace = whole.paces[0]
-    one, two = (scene.squares(pace, scene.roads(pace))[1] for scene in (whole, whole.longer(2)))
-    other = whole.squares(pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace))[1]
-    assert np.array_equal(whole.longer(2).roads(pace), whole.roads(pace)[::2])
+    pace = whole.steps_at_speeds[0]
+    one, two = (scene.mean_squares(pace, scene.roads(pace))[1] for scene in (whole, whole.in_longer_steps(2)))
+    other = whole.mean_squares(
+        pace, opened(quarter_car(options={"copies": 16, "lasting": 2.0, "seed": 2})).roads(pace)
+    )[1]
+    assert np.array_equal(whole.in_longer_steps(2).roads(pace), whole.roads(pace)[::2])
     same, apart = (by_chance((rest[:, 0] - one[:, 0],), (one[:, 0],)) for rest in (two, other))
     assert 0.0 < same[0] < 0.02 and apart[1] > 10.0 * same[1]  # other roads tell next to nothing
 
@@ -72,10 +74,10 @@ def test_longer_steps_meet_the_same_roads():
 def test_what_is_left_out_is_gone_and_gains_stand_for_it():
     whole = opened(quarter_car())
     rest = whole.without(LAWS)
-    (spring,) = nonlinear_springs(whole.vehicle(whole.paces[0]))
-    (gains,) = rest.vehicle(rest.paces[0]).springs
-    assert not nonlinear_springs(rest.vehicle(rest.paces[0])) and rest.named == ("body z",)
-    k, c = whole.paces[0].springs[spring.name].gains
+    (spring,) = nonlinear_springs(whole.vehicle(whole.steps_at_speeds[0]))
+    (gains,) = rest.vehicle(rest.steps_at_speeds[0]).springs
+    assert not nonlinear_springs(rest.vehicle(rest.steps_at_speeds[0])) and rest.named == ("body z",)
+    k, c = whole.steps_at_speeds[0].springs[spring.name].equivalent_gains
     assert (gains.stiffness, gains.damping) == pytest.approx((k, c))  # those of statistical linearisation
     with pytest.raises(InputError, match="closed form"):
         opened(quarter_car(vehicle={"file": "quarter_car_nonlinear", "small_motion": True}))
@@ -96,7 +98,7 @@ def test_a_choice_is_kept_and_says_what_chance_may_add():
     scene = quarter_car()
     choice = Chooser(scene, "reference", scene.quantities, scene.tolerance).choose()
     assert choice.within_tolerance and choice.left_out and choice.times > 1
-    assert scene.tolerance - choice.confirmed[0] >= choice.chance[0] > 0.0
+    assert scene.tolerance - choice.confirmed_change[0] >= choice.statistical_error[0] > 0.0
 
 
 def test_few_copies_find_what_all_of_them_tell():
@@ -142,7 +144,7 @@ def test_prices_of_a_ride_on_bent_springs_say_what_chance_may_add(monkeypatch):
     assert set(LAWS) < set(prices) and after["terms"] == before["terms"] + 1
     rate = {change.name: change for change in prices["curves over rate"].changes}["body front"]
     assert rate.chance > 0.0 and rate.relative > 0.01
-    assert " +- " in "\n".join(lines(found, ["body front"])).partition("body front by")[2]
+    assert " +- " in "\n".join(price_list_lines(found, ["body front"])).partition("body front by")[2]
     assert "weighting" in prices and "not read by runs in time" in prices["weighting"].why
 
 

@@ -9,10 +9,10 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.advice.ride_choice.modes import modes_of
 from models.advice.ride_choice.reduced import FullScene
 from models.advice.ride_choice.response import Response
-from models.advice.ride_choice.screen import confirmed, solved_in_motions
+from models.advice.ride_choice.screen import exact_variances, solved_in_motions
 from models.ride.covariance import noise_of
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import ReducedScene, without
+from models.systems.ride.reduced_scene import ReducedScene, reduced_without
 from models.systems.ride.scene import build
 
 TABLE = {
@@ -41,7 +41,7 @@ def test_motions_tell_covariance_adjoint_and_exponential(more):
     L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
     scale = size(np.einsum("ki,kj->kij", *[np.diagonal(L, axis1=1, axis2=2)] * 2))
     assert np.abs(modes.adjoints(C) - L).max() < 1e-9 * scale.max()
-    assert modes.moved(0.1, np.eye(len(A))) == pytest.approx(expm(0.1 * A), abs=1e-8 * np.abs(A).max())
+    assert modes.propagated(0.1, np.eye(len(A))) == pytest.approx(expm(0.1 * A), abs=1e-8 * np.abs(A).max())
 
 
 def test_motions_that_are_alike_are_left_to_the_solve():
@@ -52,7 +52,7 @@ def test_responses_by_motions_are_those_of_the_solve_with_and_without_mass():
     scene = whole()
     effects = [effect for effect in effects_of(scene.scene) if effect.name in ("mass of all wheels", "tyre damping")]
     omega = np.geomspace(0.01, 1e5, 50)
-    for rest in (scene.scene, without(scene.scene, effects)):
+    for rest in (scene.scene, reduced_without(scene.scene, effects)):
         vehicle = scene.reduced(rest).of_vehicle
         response = Response(vehicle, [0, 2], omega)
         assert response.motions is not None
@@ -67,7 +67,7 @@ def test_responses_by_motions_are_those_of_the_solve_with_and_without_mass():
 
 def test_variances_by_motions_are_those_of_the_exact_solve_and_wrong_motions_are_seen():
     reduced = whole().full
-    exact = confirmed(reduced, [0, 2])
+    exact = exact_variances(reduced, [0, 2])
     assert solved_in_motions(reduced, [0, 2]) == pytest.approx(exact, rel=1e-10)
     wrong = replace(reduced)
     wrong.__dict__["modes"] = replace(reduced.modes, rates=reduced.modes.rates * (1 + 1e-6))

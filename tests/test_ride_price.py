@@ -24,5 +24,5 @@ def test_a_route_that_loses_digits_fails_its_row(measured):
         ride.RoutePoint(**{**vars(p), "errors": {"tyre forces": 1e-8}}) if "Lyapunov" in p.name else p for p in points
     ]
     known = ride.PricedRide(None, {}, None, 1e-12)
-    failed = [row.id for row in ride.judged(known, lossy) if row.status == "failed"]
+    failed = [row.id for row in ride.judging_rows(known, lossy) if row.status == "failed"]
     assert failed == ["price.ride.error.Lyapunov"]

@@ -114,12 +114,12 @@ def test_a_road_of_an_iso_class_has_its_level():
 
 
 def test_the_system_as_python_control_has_it():
-    from models.ride.excited import excited
+    from models.ride.excited import vehicle_with_road
     from models.vehicles.spatial_linear import linearise
 
     scene = build(TABLE)
     linear = linearise(vehicle_of(scene))
-    system = excited(linear, excitation_of(scene, linear.wheels), 20.0)
+    system = vehicle_with_road(linear, excitation_of(scene, linear.wheels), 20.0)
     found = state_space(system)
     assert found.ninputs == 4 and found.noutputs == len(system.names) and found.input_labels[2] == "w2_1"
     assert np.array_equal(found.A, system.A) and np.array_equal(found.B[:, 2:], system.B[1])
@@ -254,20 +254,20 @@ def test_a_wheel_in_the_middle_is_on_neither_of_two_tracks(twinrig, capsys):
 def test_a_mass_in_grams_is_asked_about_and_no_shipped_vehicle_is():
     from dataclasses import replace
 
-    from models.systems.ride.plan import doubts
+    from models.systems.ride.plan import frequency_doubts
     from models.vehicles.vehicle_file import load_vehicle, shipped
 
-    assert not any(doubts(load_vehicle(name, towing=True)) for name in shipped())
+    assert not any(frequency_doubts(load_vehicle(name, towing=True)) for name in shipped())
     own = load_vehicle("half_car")
     heavy = replace(own, bodies=tuple(replace(body, mass=1e3 * body.mass) for body in own.bodies))
-    assert "SI units" in doubts(heavy)[0]
+    assert "SI units" in frequency_doubts(heavy)[0]
 
 
 def test_models_of_the_same_size_are_told_by_their_files():
     from models.vehicles.vehicle_file import load_vehicle
-    from studies.ride_detail import _named
+    from studies.ride_detail import _vehicles_by_name
 
-    names = list(_named([load_vehicle(name) for name in ("half_car", "r19_free", "r19_ride")]))
+    names = list(_vehicles_by_name([load_vehicle(name) for name in ("half_car", "r19_free", "r19_ride")]))
     assert names == ["4 freedoms", "19 freedoms of r19_free.toml", "19 freedoms of r19_ride.toml"]
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from models.core.errors import InputError
 from models.road import SplineProfile
-from models.road.continuation import continued, reference_height, run_in
-from models.road.polyline import PolylineProfile, polyline
+from models.road.continuation import continued_road, reference_height, run_in
+from models.road.polyline import PolylineProfile, polyline_through
 from models.road.study import study_road
 
 STATION = np.cumsum(np.random.default_rng(3).uniform(0.1, 0.4, 61)) + 2.0
@@ -34,7 +34,7 @@ def assert_c2(profile, s):
 
 def test_the_measure_sees_corners():
     """Planted faults: a corner of the slope, and the spline folded at its end, which has a slope there."""
-    assert jumps_at(polyline(ROAD), STATION[30])[1] > 0.05
+    assert jumps_at(polyline_through(ROAD), STATION[30])[1] > 0.05
 
     class Folded:
         def height_and_slope(self, s):
@@ -47,7 +47,7 @@ def test_the_measure_sees_corners():
 
 def test_mirrored_is_c2_at_every_turn():
     length = ROAD.end - ROAD.start
-    road = continued(ROAD, "mirrored", 75.0)
+    road = continued_road(ROAD, "mirrored", 75.0)
     assert road.extent[1] >= 75.0
     for i in range(1, 5):
         assert_c2(road, ROAD.start + i * length)
@@ -56,7 +56,7 @@ def test_mirrored_is_c2_at_every_turn():
 
 def test_mirrored_passes_through_the_points_forth_and_back():
     length = ROAD.end - ROAD.start
-    road = continued(ROAD, "mirrored", 75.0)
+    road = continued_road(ROAD, "mirrored", 75.0)
     np.testing.assert_allclose(road.height_and_slope(STATION)[0], HEIGHT, atol=1e-10)
     back = ROAD.end + (ROAD.end - STATION)
     np.testing.assert_allclose(road.height_and_slope(back)[0], HEIGHT, atol=1e-10)
@@ -66,22 +66,22 @@ def test_mirrored_passes_through_the_points_forth_and_back():
 
 
 def test_the_measured_part_changes_only_near_its_end():
-    road = continued(ROAD, "mirrored", ROAD.end + 1.0)
+    road = continued_road(ROAD, "mirrored", ROAD.end + 1.0)
     s = np.linspace(STATION[0], STATION[-20], 500)
     # 20 stations before the end the influence of the end has fallen by about 0.27^20 = 4e-12, times 0.1 m
     np.testing.assert_allclose(road.height_and_slope(s)[0], ROAD.height_and_slope(s)[0], atol=1e-10)
 
 
 def test_long_enough_or_endless_roads_are_left_alone():
-    assert continued(ROAD, "refused", ROAD.end) is ROAD
-    assert continued(ROAD, "refused", ROAD.end * (1 + 1e-15)) is ROAD  # a run to the end, with v t rounded up
+    assert continued_road(ROAD, "refused", ROAD.end) is ROAD
+    assert continued_road(ROAD, "refused", ROAD.end * (1 + 1e-15)) is ROAD  # a run to the end, with v t rounded up
     study = study_road()
-    assert continued(study, "refused", 1e6) is study
+    assert continued_road(study, "refused", 1e6) is study
 
 
 def test_refusal_names_both_distances():
     with pytest.raises(InputError, match=r"scene\.toml: survey\.csv: the road ends at s = .* run needs 1200 m"):
-        continued(ROAD, "refused", 1200.0, "scene.toml")
+        continued_road(ROAD, "refused", 1200.0, "scene.toml")
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_refusal_names_both_distances():
 )
 def test_wrong_rules_and_distances_are_refused(rule, needed, words):
     with pytest.raises(InputError, match=words):
-        continued(ROAD, rule, needed, "scene.toml")
+        continued_road(ROAD, rule, needed, "scene.toml")
 
 
 @pytest.mark.parametrize("length", [0.5, 5.0])
@@ -123,8 +123,8 @@ def test_two_tracks_with_one_reference_keep_their_bank():
 
 def test_run_in_and_continuation_may_come_in_either_order():
     s = np.linspace(-3.0, 60.0, 700)
-    one = run_in(continued(ROAD, "mirrored", 60.0), 2.0, -200.0).height_and_slope(s)
-    two = continued(run_in(ROAD, 2.0, -200.0), "mirrored", 60.0).height_and_slope(s)
+    one = run_in(continued_road(ROAD, "mirrored", 60.0), 2.0, -200.0).height_and_slope(s)
+    two = continued_road(run_in(ROAD, 2.0, -200.0), "mirrored", 60.0).height_and_slope(s)
     np.testing.assert_allclose(one[0], two[0], atol=1e-10)
     np.testing.assert_allclose(one[1], two[1], atol=1e-8)
 
@@ -137,6 +137,6 @@ def test_impossible_run_ins_are_refused(length):
 
 
 def test_a_polyline_stays_a_polyline():
-    road = run_in(continued(polyline(ROAD), "mirrored", 40.0), 2.0)
+    road = run_in(continued_road(polyline_through(ROAD), "mirrored", 40.0), 2.0)
     assert isinstance(road, PolylineProfile)
     assert road.height_slope_at(-1.0) == (0.0, 0.0)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from models.core.errors import InputError
 from models.road import SineProfile, SplineProfile, kernels
-from models.road.iso8608 import CLASSES, iso8608_road, random_phases, rough_road
-from models.road.polyline import polyline
+from models.road.iso8608 import DENSITY_OF_CLASS, iso8608_road, random_phases, rough_road
+from models.road.polyline import polyline_through
 from models.road.study import STUDY_GD, hills_road, study_road
 
 
@@ -164,7 +164,7 @@ def test_pieces_are_found_on_uneven_stations(gaps, place):
 
 def test_a_polyline_passes_its_points_and_has_corners():
     road = SplineProfile.through([0.0, 1.0, 3.0, 4.0], [0.0, -1.0, 1.0, 0.0], "bumps")
-    corners = polyline(road)
+    corners = polyline_through(road)
     np.testing.assert_allclose(corners.height_and_slope(road.station)[0], road.points[1], atol=1e-15)
     assert corners.height_slope_at(2.0) == (0.0, 1.0)
     # at a point the slope is that of the piece that follows
@@ -195,7 +195,7 @@ def test_a_finite_road_is_never_left_in_silence(s):
         (lambda: SplineProfile.through([0, 1, 1, 2], [0, 0, 0, 0]), "station 2.*greater than 1"),
         (lambda: SplineProfile.through([0, 1, 3, 2], [0, 0, 0, 0]), "station 3"),
         (lambda: SplineProfile.through([0, 1, 2, 3], [0, 0, np.inf, 0]), "finite"),
-        (lambda: polyline(([0, 1, 1], [0, 1, 2])), "station 2"),
+        (lambda: polyline_through(([0, 1, 1], [0, 1, 2])), "station 2"),
         (lambda: study_road(-1.0), "gd"),
         (lambda: iso8608_road("I"), "'I'.*allowed: A, B"),
         (lambda: iso8608_road("a"), "must be a class"),
@@ -242,8 +242,8 @@ def test_density_of_a_generated_road_follows_the_class_octave_by_octave():
 
 
 def test_classes_and_seeds():
-    assert CLASSES["A"] == 16e-6
-    assert CLASSES["H"] == pytest.approx(262144e-6)
+    assert DENSITY_OF_CLASS["A"] == 16e-6
+    assert DENSITY_OF_CLASS["H"] == pytest.approx(262144e-6)
     np.testing.assert_array_equal(iso8608_road("B", 5).phase, iso8608_road("B", 5).phase)
     assert np.all(iso8608_road("B", 5).phase != iso8608_road("B", 6).phase)
     phases = random_phases(0, 4000)

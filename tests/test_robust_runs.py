@@ -17,7 +17,7 @@ import pytest
 from models.core.errors import RunFailed
 from models.ensemble import runner
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import processes
+from models.ensemble.workers import process_pool
 from studies.command.sweep import Points
 
 
@@ -39,17 +39,17 @@ class Suicide:
 
 
 def test_a_worker_that_dies_is_replaced_and_its_block_computed_again(tmp_path):
-    with processes(2) as executor:
+    with process_pool(2) as executor:
         assert np.array_equal(
             run_paths(Suicide(tmp_path, 1), 9, executor=executor, blocks=Blocks(3))["x"], np.arange(9)
         )
 
 
 def test_a_block_that_kills_every_worker_is_the_only_failure(tmp_path):
-    with processes(2) as executor, pytest.raises(RunFailed) as caught:
+    with process_pool(2) as executor, pytest.raises(RunFailed) as caught:
         run_paths(Suicide(tmp_path, 99), 9, executor=executor, blocks=Blocks(3))
     assert str(caught.value) == "ensemble: block 0 (paths 0 to 2): its worker died: killed, or out of memory"
-    assert len(list(tmp_path.iterdir())) == runner.LIVES
+    assert len(list(tmp_path.iterdir())) == runner.MOST_WORKER_LOSSES
 
 
 QUICK_STUDY = '''"""A study of a contact that takes no time, for sweeps that are killed."""
@@ -73,7 +73,7 @@ import sys, types
 from models.ensemble import store
 from studies import command_line
 from studies.command import sweep
-store._code = sweep.code = lambda *root: "the sources may be edited while a test runs"
+store._code_checksum = sweep.checksum_of_sources = lambda *root: "the sources may be edited while a test runs"
 study = types.ModuleType("studies.contact")
 exec(open({study!r}).read(), study.__dict__)
 sys.modules["studies.contact"] = study

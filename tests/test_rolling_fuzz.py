@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.hard_cases.rolling import KINDS
 
 SPREAD = np.array([2e-3, 1e-4, 2e-4, 5e-3, 1.0, 0.05, 0.01, 0.05, 0.05, 1.0])
@@ -35,11 +35,17 @@ that these may differ by what halving the step does.
 
 def drawn(draw):
     """A wheelset, its speed, law, step and the move of its start."""
-    values = {name: getattr(CHOSEN, name) * 2.0 ** draw.uniform(-2.0, 2.0) for name in SPREADABLE}
+    values = {name: getattr(CHOSEN_WHEELSET, name) * 2.0 ** draw.uniform(-2.0, 2.0) for name in SPREADABLE}
     values["load"] = values["mass"] * 9.81 + 10.0 ** draw.uniform(2.0, 5.0)
     speed = 10.0 ** draw.uniform(0.5, 2.0) * draw.choice((-1.0, 1.0))
     step = float(draw.choice((1e-4, 5e-4)))
-    return CHOSEN.changed(**values), speed, str(draw.choice(("linear", "fastsim"))), step, draw.normal(size=eq.STATES)
+    return (
+        CHOSEN_WHEELSET.changed(**values),
+        speed,
+        str(draw.choice(("linear", "fastsim"))),
+        step,
+        draw.normal(size=eq.STATE_COUNT),
+    )
 
 
 def ended(kind, wheelset, speed, law, step, moved, parts=1, nudge=0.0):

@@ -15,14 +15,14 @@ from models.road.iso8608 import iso8608_road, random_phases
 from models.road.profile import SineProfile
 from models.road.study import study_road
 from models.systems import run
-from models.systems.hub_forces.measurement import recorded, two_tracks
+from models.systems.hub_forces.measurement import recorded_measurement, two_tracks
 from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.parameters import asymmetric_twin
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.hub_forces import BARE_SCENE, HUBS, ON_ROAD, PERIOD, STEP, STEPS, write
 from validation.spatial.cars import r19
-from validation.spatial.hub_inputs import centres
+from validation.spatial.hub_inputs import centres_of_mass
 
 pytestmark = pytest.mark.grounds("closed form")
 P = asymmetric_twin.PARAMETERS
@@ -161,7 +161,7 @@ def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engi
     fine = np.linspace(0.0, time, dense)
     acceleration = np.interp(fine, PERIOD * np.arange(len(samples)), samples) / CUT_MASS - GRAVITY
     rise = np.trapezoid((time - fine) * acceleration, fine)
-    path = centres(CUT, result.detail.positions[[0, -1]])
+    path = centres_of_mass(CUT, result.detail.positions[[0, -1]])
     assert path[1] - path[0] == pytest.approx([0.0, 0.0, rise], abs=1e-6 * abs(rise))
     assert result.times == pytest.approx(STEP * np.arange(STEPS + 1), abs=1e-12)
     assert result["z"].tolist() == result.detail.positions[:, 2].tolist()
@@ -218,7 +218,7 @@ def test_noise_of_hub_forces_and_angles_has_the_deviations_of_its_scene():
     noisy = {"frame": "inertial", "sampling_rate": 1000.0, "force_deviation": 80.0, "moment_deviation": 20.0}
     table["angles"] = {"angle_deviation": 0.02, "rate_deviation": 0.3}
     measured = measure(of_table({**table, "forces": noisy}, "s.toml", Path()), "reference")
-    forces, angles = recorded(measured.truth, "inertial", 1)
+    forces, angles = recorded_measurement(measured.truth, "inertial", 1)
     noise = (measured.forces.samples - forces.samples).reshape(-1, len(HUBS), 2, 3)
     angles = (measured.angles.samples - angles.samples).reshape(-1, 2, 2)
     # 4 deviations of the deviation of 12,000 and of 2,000 samples: 2.6 % and 6.3 %

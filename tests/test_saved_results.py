@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from models.core.result import load
-from studies.command.asked import SCENES, checked_study, engines_of, load_scene
+from studies.command.asked import SCENES_FOLDER, checked_study, engines_of, load_scene
 from validation.replay.jobs import SHORT_RUN_SETTINGS
 
 LESS = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
-NAMES = sorted(path.stem for path in SCENES.glob("*.toml"))
+NAMES = sorted(path.stem for path in SCENES_FOLDER.glob("*.toml"))
 OTHERS = ("animation", "choice", "choice_hub_forces", "choice_road", "choice_wheelset", "contact_price")
 """Films are no results, a choice saves the table of its questions, and a search takes half a minute."""
 

@@ -8,18 +8,18 @@ import pytest
 from models.core.errors import InputError
 from models.core.result import Result
 from models.drift.score import (
-    CHANNELS,
+    SECTION_FORCE_CHANNELS,
     Errors,
     Limits,
     RunFigures,
     blind_verdict,
-    consistent,
-    errors,
+    errors_of_run,
     figures_of_run,
+    innovations_are_consistent,
     low_pass,
-    rms,
+    root_mean_square,
     section_forces,
-    verdict,
+    verdict_on_run,
 )
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
 from models.systems.pitch_plane.run import run as simulate
@@ -39,7 +39,7 @@ FIGURES = RunFigures(
     steps=1,
 )
 ERRORS = Errors(
-    damage=dict.fromkeys(CHANNELS, 1.01),
+    damage=dict.fromkeys(SECTION_FORCE_CHANNELS, 1.01),
     force_rms={},
     vertical_damage={"f3": 1.0, "f4": 1.0},
     pitch_max=0.01,
@@ -64,7 +64,7 @@ def run(folder, effects=None, engine="reference", **override):
 
 def test_a_run_scored_against_itself_is_perfect(place):
     _, truth = place
-    found = errors(truth, truth)
+    found = errors_of_run(truth, truth)
     assert set(found.damage.values()) | set(found.vertical_damage.values()) == {1.0}
     assert {*found.force_rms.values(), found.pitch_max, found.pitch_rms, found.heave_max} == {0.0}
 
@@ -75,7 +75,7 @@ def test_artificial_moment_is_the_multiplier_of_a_guided_run(engine, place):
     folder, _ = place
     found, p = run(folder, {"prescribed_pitch": {"file": "pitch.csv"}}, engine, I=580.0)
     # generalised-alpha's multiplier and states err by 1e-3 of I pitch'', 4 N m in 150; the others by less
-    assert figures_of_run(found, p).moment_rms == pytest.approx(rms(found["enforced_moment"]), rel=0.03)
+    assert figures_of_run(found, p).moment_rms == pytest.approx(root_mean_square(found["enforced_moment"]), rel=0.03)
 
 
 @pytest.mark.grounds("closed form")
@@ -85,7 +85,7 @@ def test_artificial_moment_is_that_of_the_spring(engine, place):
     found, p = run(folder, {"pitch_spring": {"stiffness": 300.0, "damping": 50.0}}, engine)
     spring = 300.0 * found["pitch"] + 50.0 * found["pitch_rate"]
     # the balance over a step errs by some 1e-4 of I pitch'', 0.3 N m in 15
-    assert figures_of_run(found, p).moment_rms == pytest.approx(rms(spring), rel=0.02)
+    assert figures_of_run(found, p).moment_rms == pytest.approx(root_mean_square(spring), rel=0.02)
 
 
 @pytest.mark.parametrize("frame", ["inertial", "body"])
@@ -116,7 +116,9 @@ def test_figures_of_a_run_are_shares_of_its_chassis_inertia(place):
 @pytest.mark.grounds("closed form")
 def test_the_band_ends_at_15_hz():
     t = 1e-3 * np.arange(20_000)
-    ratios = [rms(low_pass(np.sin(2 * np.pi * f * t), 1e-3)[5000:-5000]) * 2**0.5 for f in (5.0, 15.0, 30.0)]
+    ratios = [
+        root_mean_square(low_pass(np.sin(2 * np.pi * f * t), 1e-3)[5000:-5000]) * 2**0.5 for f in (5.0, 15.0, 30.0)
+    ]
     # Butterworth of order 4 run twice: 1 / (1 + (f / 15 Hz)^8), within the ripple of frequency warping
     assert ratios == pytest.approx([1.0, 0.5, 1 / 257], rel=0.02)
 
@@ -127,7 +129,7 @@ def test_a_drifting_heave_leaves_body_frame_forces_alone(place):
     moved = Result(truth.data.copy())
     for name in ("z1", "z2", "z3"):
         moved.data[name] = truth.data[name] + 3.0 * truth.data["time"]
-    found = errors(moved, truth)
+    found = errors_of_run(moved, truth)
     assert found.heave_max == pytest.approx(3.0 * DURATION) and set(found.damage.values()) == {1.0}
 
 
@@ -135,7 +137,7 @@ def test_vertical_forces_are_blind_to_a_pitch_of_any_size(place):
     _, truth = place
     turned = Result(truth.data.copy())
     turned.data["pitch"] = truth.data["pitch"] + 1.0
-    found = errors(turned, truth)
+    found = errors_of_run(turned, truth)
     assert set(found.vertical_damage.values()) == {1.0}
     assert min(found.damage["f3x"], found.damage["f4x"]) > 1e3
 
@@ -154,7 +156,7 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     turned = Result(truth.data.copy())
     turned.data["pitch"] = truth.data["pitch"] + 1.0
     # pitch of up to 0.07 rad changes cos(1 + pitch) by 11 %, to the power 5 by up to 1.7
-    assert 0.54**5 / 2 < errors(turned, truth).damage["f3z"] < 0.54**5 * 2
+    assert 0.54**5 / 2 < errors_of_run(turned, truth).damage["f3z"] < 0.54**5 * 2
 
 
 @pytest.mark.parametrize(
@@ -173,7 +175,7 @@ def test_the_upright_component_is_scored_in_the_chassis_frame(place):
     ],
 )
 def test_verdict_with_the_truth(own, wrong, effects, word):
-    assert verdict(replace(FIGURES, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
+    assert verdict_on_run(replace(FIGURES, **own), replace(ERRORS, **wrong), effects, Limits()).word == word
 
 
 @pytest.mark.parametrize(
@@ -201,14 +203,14 @@ def test_verdict_without_the_truth(own, effects, more, word):
 def test_a_filter_is_consistent_where_its_surprises_are_its_own(mean, expected, place):
     """10,000 values: the 99.9 % band of their mean is 1 +- 0.047."""
     filtered = Result(place[1].data.copy())
-    assert consistent(filtered) is None
+    assert innovations_are_consistent(filtered) is None
     for name, last in (("kalman_used", 1e4), ("kalman_surprise", mean * 1e4)):
         filtered.data[name] = ("time", np.linspace(0.0, last, len(filtered.times)))
-    assert consistent(filtered) is expected
+    assert innovations_are_consistent(filtered) is expected
 
 
 def test_reasons_name_what_is_wrong():
-    found = verdict(replace(FIGURES, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
+    found = verdict_on_run(replace(FIGURES, moment_share_band=0.2), replace(ERRORS, pitch_max=0.3), GUIDED, Limits())
     assert found.reason == "pitch wrong by 0.3 rad; artificial moment 20% of I pitch''"
 
 
@@ -222,7 +224,7 @@ def test_rows_that_are_too_far_apart_are_refused(spacing, place):
 def test_runs_at_other_times_are_refused(place):
     _, truth = place
     with pytest.raises(InputError, match="same times"):
-        errors(truth.every(2e-3), truth)
+        errors_of_run(truth.every(2e-3), truth)
 
 
 @pytest.mark.parametrize("load", [np.array([]), np.array([1.0, np.nan, 2.0]), np.array([1.0, np.inf])])
@@ -264,7 +266,7 @@ def test_a_spring_taken_for_a_measurement_is_found(implementation, monkeypatch, 
     from validation.hard_cases.case import judge
 
     case = next(case for case in drift.CASES if case.name == "spring on a grade")
-    monkeypatch.setattr(score, "MEASURED", (*score.MEASURED, "pitch_spring"))
+    monkeypatch.setattr(score, "MEASURED_PITCH_EFFECTS", (*score.MEASURED_PITCH_EFFECTS, "pitch_spring"))
     assert judge(case, implementation, tmp_path).word == "SILENT"
 
 
@@ -275,6 +277,6 @@ def test_forces_scored_without_their_pitch_are_found(monkeypatch, tmp_path):
     from validation.hard_cases.case import judge
 
     case = next(case for case in drift.CASES if case.name == "drifted run scored by its vertical forces")
-    monkeypatch.setattr(score, "TUMBLED", np.inf)
+    monkeypatch.setattr(score, "TUMBLING_PITCH", np.inf)
     monkeypatch.setattr(score, "_exceeded_limits", lambda found, limits: [])
     assert judge(case, "reference", tmp_path).word == "SILENT"

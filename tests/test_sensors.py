@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.noise import GYRO, PITCH_SENSOR, normal
+from models.core.noise import GYRO, PITCH_SENSOR, normal_samples
 from models.core.time_series import read_time_series
 from models.engines.assembly import Settings
-from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias_path
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
-from models.systems.pitch_plane.scene import assemble, build
+from models.systems.pitch_plane.scene import assembly_of_scene, build
 
 ENGINES = ("reference", "exudyn", "mujoco")
 
@@ -38,13 +38,13 @@ def test_readings_are_the_truth_at_their_instants_plus_their_own_noise(engine):
         ("gyro", "pitch_rate", 10, 0.02, GYRO),
         ("pitch_reading", "pitch", 20, 0.01, PITCH_SENSOR),
     ):
-        noise = deviation * normal(4, 2, 800 // every + 1, 1, source=source)[:, 0]
+        noise = deviation * normal_samples(4, 2, 800 // every + 1, 1, source=source)[:, 0]
         assert np.array_equal(run[channel], run[true][rows - rows % every] + noise[rows // every])
     assert np.array_equal(run.states, simulate(scene({}), engine).states)
 
 
 def test_instruments_of_one_seed_are_independent():
-    draws = [normal(7, 0, 20_000, 1, source=source)[:, 0] for source in range(4)]
+    draws = [normal_samples(7, 0, 20_000, 1, source=source)[:, 0] for source in range(4)]
     off = np.corrcoef(draws)[np.triu_indices(4, 1)]
     assert np.abs(off).max() < 4.0 / np.sqrt(20_000)  # 4 standard errors; the same stream would give 1
 
@@ -55,7 +55,7 @@ def test_bias_stands_on_the_gyro_and_beside_it():
     own = {"turn_on": 10.0, "instability": 3.0, "correlation_time": 0.1, "seed": 5}
     plain, biased = (simulate(scene({"gyro": gyro, **more}), "reference") for more in ({}, {"gyro_bias": own}))
     assert np.array_equal(biased["gyro"], plain["gyro"] + biased["gyro_bias"])
-    drift = bias(401, 1e-3, 10 * DEGREES_PER_HOUR, 3 * DEGREES_PER_HOUR, 0.1, 5, 0)
+    drift = bias_path(401, 1e-3, 10 * DEGREES_PER_HOUR, 3 * DEGREES_PER_HOUR, 0.1, 5, 0)
     assert np.array_equal(biased["gyro_bias"], np.repeat(drift, 2)[:801])
     assert np.ptp(drift) > 0
 
@@ -69,7 +69,7 @@ def test_bias_needs_a_gyro():
 def test_stationary_bias_of_any_sampling_rate():
     """4,000 paths at two rates: the variance at each end and the correlation over one correlation time."""
     for later, period in ((2, 0.25), (20, 0.025)):
-        ends = np.array([bias(later + 1, period, 0.0, 2.0, 0.5, 1, path)[[0, later]] for path in range(4000)])
+        ends = np.array([bias_path(later + 1, period, 0.0, 2.0, 0.5, 1, path)[[0, later]] for path in range(4000)])
         covariance = ends.T @ ends / 4000
         # 99.9 % of a mean of 4,000 squares lies within 3.3 sqrt(2 / 4000), 7.4 %
         assert covariance[0, 0] == pytest.approx(4.0, rel=0.074) and covariance[1, 1] == pytest.approx(4.0, rel=0.074)
@@ -99,7 +99,7 @@ def test_a_rate_that_falls_between_the_steps_is_refused():
         simulate(scene({"gyro": {"sampling_rate": 300.0, "deviation": 0.1}}), "reference")
     own = scene({"pitch_sensor": {"sampling_rate": 100.0, "deviation": 0.1}}, exudyn={"integrator": "DOPRI5"})
     with pytest.raises(InputError, match="needs a row"):
-        assemble(own)
+        assembly_of_scene(own)
     uneven = scene({"gyro": {"sampling_rate": 100.0, "deviation": 0.1}})
     with pytest.raises(InputError, match="needs a row"):
         simulate(uneven, "reference", Settings("RK4", 4e-3, 0.4))

@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial import polynomial
 
 from models.brake.brake import Brake, of_wheels
-from models.brake.controllers.five_phase_cycle import WheelState, corner
+from models.brake.controllers.five_phase_cycle import WheelState, time_to_corner
 from models.core.piecewise import evaluate, interpolate
 from models.multibody.tree import add, cross, dot, plus, times
 from models.road.kernels import cubics_uniform
@@ -26,11 +26,11 @@ def rolling_at(pressure, torque):
 def test_corners_of_the_brake_s_loop_lie_where_its_two_lines_meet_the_torque():
     """The upward line gives 1500 N m at 0.75 + 1500/1500 bar, the downward one at 0.5 + 1500/2000 bar."""
     brakes = of_wheels(Brake(push_out=0.75, release=0.5, rising=1500.0, falling=2000.0))
-    assert corner(rolling_at(1.0, 1500.0), 10.0, brakes) == CLOSE(0.075, rel=ROUNDING)
-    assert corner(rolling_at(1.5, 1500.0), -10.0, brakes) == CLOSE(0.025, rel=ROUNDING)
-    assert corner(rolling_at(1.0, 1000.0), -10.0, brakes) == CLOSE(0.05, rel=ROUNDING)
-    assert corner(rolling_at(0.4, 0.0), -10.0, brakes) == CLOSE(0.04, rel=ROUNDING)
-    assert corner(rolling_at(2.0, 1500.0), 10.0, brakes) == math.inf
+    assert time_to_corner(rolling_at(1.0, 1500.0), 10.0, brakes) == CLOSE(0.075, rel=ROUNDING)
+    assert time_to_corner(rolling_at(1.5, 1500.0), -10.0, brakes) == CLOSE(0.025, rel=ROUNDING)
+    assert time_to_corner(rolling_at(1.0, 1000.0), -10.0, brakes) == CLOSE(0.05, rel=ROUNDING)
+    assert time_to_corner(rolling_at(0.4, 0.0), -10.0, brakes) == CLOSE(0.04, rel=ROUNDING)
+    assert time_to_corner(rolling_at(2.0, 1500.0), 10.0, brakes) == math.inf
 
 
 def test_pieces_of_a_polynomial_and_their_derivatives():

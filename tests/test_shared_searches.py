@@ -12,16 +12,16 @@ from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import SettingChoice, _valid_over_run, recommend
 from models.advice.price.search import Search, TriedSetting
-from models.advice.price.truth import ReferenceTruth, truth
+from models.advice.price.truth import ReferenceTruth, reference_truth
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
-from models.ensemble.workers import processes
+from models.ensemble.workers import process_pool
 from models.identification.fit import fit
-from models.identification.problem import FAILED, FitClock, Parameter, Problem, measured_channel
+from models.identification.problem import FAILED_RESIDUAL, FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import uncertainty
 from models.rail.equations import Equations
-from models.rail.limit_cycle import beginning, branch, refined
-from models.rail.wheelset import CHOSEN
+from models.rail.limit_cycle import branch_of_orbits, orbit_of_small_amplitude, refined_orbit
+from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.pitch_plane.scene import build
 
 CREWS = pytest.mark.parametrize("pool", [2, pytest.param(5, marks=pytest.mark.full)], indirect=True)
@@ -29,7 +29,7 @@ CREWS = pytest.mark.parametrize("pool", [2, pytest.param(5, marks=pytest.mark.fu
 
 @pytest.fixture(scope="module")
 def pool(request):
-    with processes(request.param) as executor:
+    with process_pool(request.param) as executor:
         yield executor
 
 
@@ -83,7 +83,7 @@ def test_columns_of_a_jacobian_go_backward_where_the_model_fails_or_a_bound_lies
     problem = bent_problem()
     values = np.array([1.5, -0.1, 0.2])  # forward the first fails, and the second has a bound
     columns = problem.jacobian(values, executor=pool)
-    assert np.array_equal(columns, problem.jacobian(values)) and np.abs(columns).max() < FAILED
+    assert np.array_equal(columns, problem.jacobian(values)) and np.abs(columns).max() < FAILED_RESIDUAL
     times, weights = np.linspace(0.0, 1.0, 200), problem.weights[0]
     slopes = [np.exp(-0.1 * times), 1.5 * times * np.exp(-0.1 * times), times]
     exact = np.stack([slope * each.scale for slope, each in zip(slopes, problem.parameters, strict=True)], axis=-1)
@@ -91,11 +91,16 @@ def test_columns_of_a_jacobian_go_backward_where_the_model_fails_or_a_bound_lies
 
 
 def test_a_branch_of_cycles_is_the_same_by_workers():
-    with processes(2) as pool:
+    with process_pool(2) as pool:
         runs = []
         for executor in (None, pool):
-            first = beginning(Equations(CHOSEN, 60.0, cells=5), 1e-3, 1e-3, executor)
-            runs.append([first, *(refined(orbit, "speed", executor) for orbit in branch(first, [5e-3], executor))])
+            first = orbit_of_small_amplitude(Equations(CHOSEN_WHEELSET, 60.0, cells=5), 1e-3, 1e-3, executor)
+            runs.append(
+                [
+                    first,
+                    *(refined_orbit(orbit, "speed", executor) for orbit in branch_of_orbits(first, [5e-3], executor)),
+                ]
+            )
     for alone, shared in zip(*runs, strict=True):
         assert np.array_equal(alone.slopes, shared.slopes) and np.array_equal(alone.state, shared.state)
         assert (alone.speed, alone.period, alone.multiplier) == (shared.speed, shared.period, shared.multiplier)
@@ -123,17 +128,17 @@ def told(choice: Choice):
 
 
 def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_not_count():
-    with processes(2) as pool:
+    with process_pool(2) as pool:
         choosers = [
             Chooser(half_car(), "reference", ["pitch", "rms f1"], 0.02, executor=executor) for executor in (None, pool)
         ]
         alone, shared = (chooser.choose() for chooser in choosers)
-        assert told(alone) == told(shared) and alone.left_out and alone.spent > 0
+        assert told(alone) == told(shared) and alone.left_out and alone.calls_of_search > 0
         variants = Variants(half_car(), "reference", pool)
         variants.ahead((frozenset([name]), 1) for name in variants.effects)
-        assert len(variants._ready) == len(variants.effects) > 3 and variants.calls == 0
+        assert len(variants._computed_in_advance) == len(variants.effects) > 3 and variants.calls == 0
         first = variants.of(["gyro"])
-    assert len(variants._ready) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
+    assert len(variants._computed_in_advance) == len(variants.effects) - 1 and variants.calls == first.counts["calls"]
     here = Variants(half_car(), "reference").of(["gyro"])
     assert first.counts == here.counts and first.quantities.keys() == here.quantities.keys()
     for name, quantity in here.quantities.items():
@@ -184,7 +189,7 @@ def same(alone: ReferenceTruth, shared: ReferenceTruth):
 
 @CREWS
 def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
-    alone, shared = (truth(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
+    alone, shared = (reference_truth(Planted(), 1e-2, 2.0, executor=executor) for executor in (None, pool))
     assert same(alone, shared) and alone.rung > 0
     over, blocks = Search(Planted(), alone, 1e-2, 2.0), []
     for ladder, i in zip(Planted().ladders(), (2, 4), strict=True):
@@ -196,9 +201,9 @@ def test_what_a_price_does_not_time_is_the_same_by_workers(pool):
 
 
 def test_a_price_by_workers_names_the_settings_of_one_process():
-    with processes(2) as pool:
+    with process_pool(2) as pool:
         alone, shared = (recommend(Planted(), 1e-2, executor) for executor in (None, pool))
-    assert same(alone.truth, shared.truth) and same(alone.searched, shared.searched)
+    assert same(alone.truth, shared.truth) and same(alone.search_truth, shared.search_truth)
     for engine in ("", "exudyn"):
         by_itself, by_workers = (each.winners[engine, "calls"] for each in (alone, shared))
         assert _facts(by_itself) == _facts(by_workers)

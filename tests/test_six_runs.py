@@ -4,7 +4,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.systems import load
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from studies.six_runs import run
 
 SHORT = ["run.duration=14.0", "options.noise_samples=2", "options.perturbed_models=1"]
@@ -13,7 +13,9 @@ SHORT = ["run.duration=14.0", "options.noise_samples=2", "options.perturbed_mode
 @pytest.fixture(scope="module")
 def summary(tmp_path_factory):
     folder = tmp_path_factory.mktemp("six")
-    return run(load(SCENES / "six_runs.toml", SHORT), ("reference", "mujoco"), folder, lambda text, part: None), folder
+    return run(
+        load(SCENES_FOLDER / "six_runs.toml", SHORT), ("reference", "mujoco"), folder, lambda text, part: None
+    ), folder
 
 
 def of(summary, engine, name):
@@ -62,12 +64,12 @@ def test_the_files_that_a_user_gets_are_there(summary):
 def test_linear_perturbed_run_does_not_drift(tmp_path):
     """Drift needs the cosine: linearised, a perturbed model stays bounded."""
     changes = ["vehicle.geometry=linear", "options.noise_samples=1", "options.perturbed_models=0", "run.duration=20.0"]
-    found = run(load(SCENES / "six_runs.toml", changes), ("reference",), tmp_path, lambda text, part: None)
+    found = run(load(SCENES_FOLDER / "six_runs.toml", changes), ("reference",), tmp_path, lambda text, part: None)
     assert of(found, "reference", "perturbed")["drift-off"] is None
 
 
 def test_sampling_rate_must_fit_the_step(tmp_path):
-    scene = load(SCENES / "six_runs.toml", ["options.sampling_rate=700.0"])
+    scene = load(SCENES_FOLDER / "six_runs.toml", ["options.sampling_rate=700.0"])
     with pytest.raises(InputError, match="sampling_rate"):
         run(scene, ("reference",), tmp_path, lambda text, part: None)
 
@@ -84,7 +86,7 @@ def test_sampling_rate_must_fit_the_step(tmp_path):
 )
 def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
-        run(load(SCENES / "six_runs.toml", [change]), ("exudyn",), tmp_path, lambda text, part: None)
+        run(load(SCENES_FOLDER / "six_runs.toml", [change]), ("exudyn",), tmp_path, lambda text, part: None)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -98,7 +100,7 @@ def test_runs_start_where_the_measurement_did_and_at_its_own_step(tmp_path):
         "options.perturbed_models=0",
         "vehicle.parameters=asymmetric_twin",
     ]
-    found = run(load(SCENES / "six_runs.toml", changes), ("reference",), tmp_path, lambda text, part: None)
+    found = run(load(SCENES_FOLDER / "six_runs.toml", changes), ("reference",), tmp_path, lambda text, part: None)
     free, guided = of(found, "reference", "undisturbed"), of(found, "reference", "guided, undisturbed")
     assert free["drift-off"] is None and free["heave error"] < 1e-4
     # the study road asks for some kN m; what is left is the interpolation between samples of 1 ms

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.signals import sampled
+from models.core.signals import signal_from_samples
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import RECOMMENDED
@@ -14,7 +14,7 @@ from models.engines.protocol import build
 from models.engines.stability import first_order, linearised, step_matrix
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks
@@ -39,7 +39,7 @@ def forces(tmp_path):
 def driven(folder, interpolation="linear", frame="inertial", geometry="exact", **effects) -> Assembly:
     """The asymmetric vehicle under the wheel forces, with further effects, released from a tilt."""
     table = {"file": "forces.csv", "interpolation": interpolation, "frame": frame}
-    return assemble(
+    return assembly_of_scene(
         build_scene(
             {
                 "title": "t",
@@ -57,7 +57,7 @@ def driven(folder, interpolation="linear", frame="inertial", geometry="exact", *
 def moment(interpolation="linear", period=SAMPLING):
     """A rough moment of 2,000 N m."""
     t = np.arange(0, DURATION + period / 2, period)
-    return sampled(2e3 * np.sin(400.0 * t + 0.5)[:, None], period, interpolation)
+    return signal_from_samples(2e3 * np.sin(400.0 * t + 0.5)[:, None], period, interpolation)
 
 
 def model(engine, assembly, **settings):
@@ -163,7 +163,7 @@ def test_a_dead_band_stands_in_a_vehicle_without_any_input(tmp_path):
         "t",
         tmp_path,
     )
-    paths = [model(engine, assemble(scene)).run().states for engine in ENGINES]
+    paths = [model(engine, assembly_of_scene(scene)).run().states for engine in ENGINES]
     assert np.abs(paths[1] - paths[0]).max() < 1e-12 > np.abs(paths[2] - paths[0]).max()
 
 
@@ -209,7 +209,7 @@ def on_rails(folder, interpolation="smooth", geometry="exact", **values):
             "prescribed_heave_and_pitch": {"file": "motion.csv", **values},
         },
     }
-    return assemble(build_scene(scene, "t", folder))
+    return assembly_of_scene(build_scene(scene, "t", folder))
 
 
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
@@ -218,7 +218,7 @@ def test_mujoco_and_the_reference_agree_on_rails(guided, geometry, interpolation
     own = on_rails(guided, interpolation, geometry)
     one, other = (model(engine, own).run() for engine in ("reference", "mujoco"))
     assert np.abs(one.states - other.states).max() < 1e-12
-    assert np.abs(one.enforced - other.enforced).max() < 1e-12 * np.abs(one.enforced).max()
+    assert np.abs(one.guiding_forces - other.guiding_forces).max() < 1e-12 * np.abs(one.guiding_forces).max()
 
 
 def test_exudyn_multipliers_on_rails(guided):
@@ -229,7 +229,7 @@ def test_exudyn_multipliers_on_rails(guided):
         for engine, name in (("reference", "RK4"), ("exudyn", "GeneralizedAlpha"))
     )
     assert np.abs(one.states - other.states)[:, [2, 3]].max() < 1e-12  # it stays where it is put
-    off = np.abs(one.enforced - other.enforced)[50:].max(axis=0) / np.abs(one.enforced).max(axis=0)
+    off = np.abs(one.guiding_forces - other.guiding_forces)[50:].max(axis=0) / np.abs(one.guiding_forces).max(axis=0)
     assert (off < 1e-3).all()
 
 
@@ -266,7 +266,7 @@ def measured(folder, **values):
             "prescribed_pitch": {"file": "pitch.csv", **values},
         },
     }
-    return assemble(build_scene(scene, "scene.toml", folder))
+    return assembly_of_scene(build_scene(scene, "scene.toml", folder))
 
 
 def test_bandwidth_takes_the_noise_and_leaves_the_motion(tmp_path):

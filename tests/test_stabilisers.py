@@ -8,7 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.systems import load
 from models.systems.pitch_plane.stabilised import Bench, Options
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from studies.stabilisers import run
 
 SHORT = ["run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]", "options.sweep=[50.0, 3e3]"]
@@ -21,7 +21,7 @@ def quiet(text, part):
 @pytest.fixture(scope="module")
 def summary(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stabilisers")
-    return run(load(SCENES / "stabilisers.toml", SHORT), ("reference", "mujoco"), folder, quiet), folder
+    return run(load(SCENES_FOLDER / "stabilisers.toml", SHORT), ("reference", "mujoco"), folder, quiet), folder
 
 
 def of(summary, method, road="road", engine="reference"):
@@ -106,12 +106,12 @@ def test_the_files_that_a_user_gets_are_there(summary):
 )
 def test_what_the_study_cannot_follow_is_refused_before_it_writes(change, words, tmp_path):
     with pytest.raises(InputError, match=words):
-        run(load(SCENES / "stabilisers.toml", [change]), ("exudyn",), tmp_path, quiet)
+        run(load(SCENES_FOLDER / "stabilisers.toml", [change]), ("exudyn",), tmp_path, quiet)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_linear_vehicle_needs_no_spring(tmp_path):
     """Linearised, nothing grows: no stiffness is needed, and noise alone ends the trust in a free run."""
-    scene = load(SCENES / "stabilisers.toml", [*SHORT, "vehicle.geometry=linear"])
+    scene = load(SCENES_FOLDER / "stabilisers.toml", [*SHORT, "vehicle.geometry=linear"])
     bench = Bench(scene, "road", Options(), tmp_path)
     assert bench.holding == 0.0 and 0.0 < bench.trusted <= 5.0

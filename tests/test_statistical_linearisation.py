@@ -6,21 +6,28 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.ride.copies_kernel import TOGETHER, march, rates
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, fill_rates, march
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.ride.frequency import standard_errors
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time, laws_of
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import GRADES, nonlinear_springs, promised, statistically_linear
-from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
-from models.systems.ride.nonlinear import ridden
+from models.ride.statistical_linearisation import ERROR_GRADES, nonlinear_springs, promised_error, statistically_linear
+from models.road.two_track import (
+    CORRELATION_CASES,
+    half_track,
+    input_covariance,
+    on_track,
+    road_excitation,
+    road_of_level,
+)
+from models.systems.ride.nonlinear import drive_over_road
 from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.cases.ride_nonlinear import expected
-from validation.ride.in_engines import NONLINEAR, ride
+from validation.ride.in_engines import NONLINEAR_VEHICLE, vehicle_and_road
 
 SPEED = 20.0
 
@@ -65,14 +72,14 @@ def test_still_springs_have_their_slope_at_rest():
 
 def test_laws_that_are_lines_give_the_linear_vehicle():
     """A spring and a damper written as curves: the covariance itself, nothing left out, no mean."""
-    vehicle, road = ride("quarter_car")
+    vehicle, road = vehicle_and_road("quarter_car")
     spring = vehicle.springs[0]
     lines = {
         "travel_force": Curve((-1.0, 0.0, 1.0), (-spring.stiffness, 0.0, spring.stiffness)),
         "rate_force": Curve((-1.0, 1.0), (-spring.damping, spring.damping)),
     }
     found = statistically_linear(sprung(vehicle, stiffness=0.0, damping=0.0, **lines), road, SPEED)
-    exact = stationary(excited(linearise(vehicle), road, SPEED))
+    exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
     assert found.covariance.deviation == pytest.approx(exact.deviation, rel=1e-12)
     assert found.left_out.max() < 1e-12
     assert np.abs(found.mean).max() < 1e-12
@@ -81,41 +88,41 @@ def test_laws_that_are_lines_give_the_linear_vehicle():
 
 def test_gains_are_those_of_their_own_covariance():
     """The definition of the fixed point, read back from the answer; the spring carries what the damper pulls."""
-    vehicle, road = ride(NONLINEAR, 4.0)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
     found = statistically_linear(vehicle, road, SPEED)
     spring, own = vehicle.springs[0], found.springs["front left"]
     travel = found.covariance.deviation[found.covariance.names.index("travel front left")]
     assert own.deviation == pytest.approx(travel, rel=1e-11)
     stops, damper = of_curve(spring.travel_force, own.travel, travel), of_curve(spring.rate_force, 0.0, own.rate)
     dry = of_friction(spring.friction, spring.friction_rate, own.rate)
-    assert own.gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
+    assert own.equivalent_gains == pytest.approx((spring.stiffness + stops[1], damper[1] + dry), rel=1e-11)
     assert spring.stiffness * own.travel + stops[0] + damper[0] == pytest.approx(0.0, abs=1e-8)
     assert own.travel > 0.005, "a damper that is harder in rebound pulls the body down: mm, in compression"
     assert found.mean[found.covariance.names.index("travel front left")] == pytest.approx(own.travel, rel=1e-12)
     assert 0.0 < found.contraction < 0.5
-    assert found.distance < 1e-11
+    assert found.fixed_point_distance < 1e-11
 
 
 def test_sentences_say_when_the_covariance_is_no_longer_good():
-    vehicle, road = ride(NONLINEAR, 16.0)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
     found = statistically_linear(vehicle, road, SPEED)
     assert all("no longer good" in sentence and "Monte Carlo" in sentence for sentence in found.sentences)
-    assert promised(0.0) == GRADES[0][1] < promised(GRADES[1][0]) < promised(0.2)
+    assert promised_error(0.0) == ERROR_GRADES[0][1] < promised_error(ERROR_GRADES[1][0]) < promised_error(0.2)
 
 
 def test_no_fixed_point_is_told(monkeypatch):
     monkeypatch.setattr("models.ride.statistical_linearisation.MOST_ROUNDS", 3)
     with pytest.raises(RunFailed, match="no one way to move"):
-        statistically_linear(*ride(NONLINEAR), SPEED)
+        statistically_linear(*vehicle_and_road(NONLINEAR_VEHICLE), SPEED)
 
 
-@pytest.mark.parametrize("case", [*CASES.values()], ids=str)
+@pytest.mark.parametrize("case", [*CORRELATION_CASES.values()], ids=str)
 def test_road_in_time_has_the_roads_covariance(case):
     """Heights at the first and the last of 200 half steps, over 4000 copies: 4.5 standard errors of 2.2 %."""
     vehicle = load_vehicle("seven_freedoms")
     own = wheels(vehicle)
     road = road_of_level(half_track(own))
-    blocks = road_path(excitation(road, own, *case), SPEED, 4e-3).blocks(50, 4000, 1)
+    blocks = road_path(road_excitation(road, own, *case), SPEED, 4e-3).blocks(50, 4000, 1)
     first, second = next(blocks), next(blocks)
     assert np.array_equal(first[-1], second[0]), "blocks go on where they ended"
     exact = input_covariance(road, own, *case)
@@ -126,7 +133,7 @@ def test_road_in_time_has_the_roads_covariance(case):
 def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
     vehicle = load_vehicle("half_car")
     own = on_track(wheels(vehicle), 1.0)
-    road = road_path(excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
+    road = road_path(road_excitation(road_of_level(1.0, cutoff=3.0), own), SPEED, 1e-3)
     table = road.table(400, 3)
     lag = round((own[0].x - own[1].x) / SPEED / road.half)
     assert np.abs(table[lag:, 1] - table[:-lag, 0]).max() == 0.0
@@ -138,11 +145,11 @@ def test_rear_wheels_meet_the_road_later_and_rates_are_its_slopes():
 
 
 def test_damped_tyres_need_a_road_with_rates():
-    vehicle, road = ride("quarter_car")
+    vehicle, road = vehicle_and_road("quarter_car")
     damped = replace(vehicle, tyres=tuple(replace(tyre, damping=50.0) for tyre in vehicle.tyres))
     for run in (
         lambda: copies_in_time(damped, road, SPEED, 1.0),
-        lambda: ridden("mujoco", damped, road_path(road, SPEED, 1e-3), 0.1),
+        lambda: drive_over_road("mujoco", damped, road_path(road, SPEED, 1e-3), 0.1),
     ):
         with pytest.raises(InputError, match=r"road.cutoff: is missing"):
             run()
@@ -150,18 +157,18 @@ def test_damped_tyres_need_a_road_with_rates():
 
 def test_copies_of_a_linear_vehicle_have_its_covariance():
     """A half car with the delay between its axles, 60 copies of 3 s: variances and means within 4 standard errors."""
-    vehicle, road = ride("half_car")
+    vehicle, road = vehicle_and_road("half_car")
     copies = copies_in_time(vehicle, road, SPEED, 3.0, copies=60, seed=4)
-    exact = stationary(excited(linearise(vehicle), road, SPEED))
+    exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
     assert np.abs(copies.z(exact.deviation)).max() < 4.0
     assert np.abs(copies.mean / copies.mean_error).max() < 4.0
     assert copies.deviation == pytest.approx(exact.deviation, rel=0.1)
 
 
 def test_engines_agree_where_springs_are_bent():
-    vehicle, excitation_ = ride(NONLINEAR, 4.0)
+    vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    one, other = (ridden(engine, vehicle, road, 0.3, seed=5, stride=20) for engine in ("exudyn", "mujoco"))
+    one, other = (drive_over_road(engine, vehicle, road, 0.3, seed=5, stride=20) for engine in ("exudyn", "mujoco"))
     assert np.abs(one.run.positions - other.run.positions).max() < 1e-13
     assert np.abs(one.run.rates - other.run.rates).max() < 1e-12
     # the strut is all that pulls at the body: its output would be -m a, and is not read by a gain
@@ -173,9 +180,9 @@ def test_engines_agree_where_springs_are_bent():
 
 def test_a_copy_goes_where_an_engine_goes():
     """The quarter car's motion is small at any size: the copies' laws step by step are MuJoCo's, so is the force."""
-    vehicle, excitation_ = ride(NONLINEAR, 16.0)
+    vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
     road = road_path(excitation_, SPEED, 1e-3)
-    run, table = ridden("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
+    run, table = drive_over_road("mujoco", vehicle, road, 0.3, seed=5).run, road.table(300, 5)
     springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, x = laws_of(vehicle, plain, springs, SPEED), np.zeros((4, 1))
@@ -183,7 +190,7 @@ def test_a_copy_goes_where_an_engine_goes():
     march(x, table[:, :, None], road.step, 300, 1, laws, sums)
     assert not sums.any(), "nothing is read before its time"
     assert np.abs(x[:, 0] - [*run.positions[-1], *run.rates[-1]]).max() < 1e-12
-    rates(x.copy(), table[-1:].T.copy(), laws, force, rate, np.empty((2, 1)))
+    fill_rates(x.copy(), table[-1:].T.copy(), laws, force, rate, np.empty((2, 1)))
     assert abs(force[0, 0]) > 100.0, "N: the bent laws are at work"
     march(x, np.repeat(table[-1:, :, None], 3, axis=0), 0.0, 0, 1, laws, sums)
     strut = vehicle.bodies[0].mass * rate[2, 0]  # all that pulls at the body
@@ -192,14 +199,14 @@ def test_a_copy_goes_where_an_engine_goes():
 
 def test_copies_side_by_side_go_where_each_goes_alone():
     """As many as two and a bit of the blocks that are stepped together, by bits: all do the same sums."""
-    vehicle, excitation_ = ride(NONLINEAR, 16.0)
-    road, copies = road_path(excitation_, SPEED, 1e-3), 2 * TOGETHER + 3
+    vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE, 16.0)
+    road, copies = road_path(excitation_, SPEED, 1e-3), 2 * COPIES_SIDE_BY_SIDE + 3
     springs = nonlinear_springs(vehicle)
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, roads = laws_of(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
     x, sums = np.zeros((4, copies)), np.zeros((4, len(plain.outputs), copies))
     march(x, roads, road.step, 0, 4, laws, sums)
-    for copy in (0, TOGETHER - 1, TOGETHER, copies - 1):
+    for copy in (0, COPIES_SIDE_BY_SIDE - 1, COPIES_SIDE_BY_SIDE, copies - 1):
         one, of_one = np.zeros((4, 1)), np.zeros((4, len(plain.outputs), 1))
         march(one, roads[:, :, copy : copy + 1].copy(), road.step, 0, 4, laws, of_one)
         assert (one[:, 0] == x[:, copy]).all() and (of_one[:, :, 0] == sums[:, :, copy]).all()
@@ -210,7 +217,7 @@ def test_standard_errors_of_a_run():
 
     The height under a quarter car's wheel on a road of one corner is that process.
     """
-    vehicle, _ = ride("quarter_car")
+    vehicle, _ = vehicle_and_road("quarter_car")
     linear = linearise(vehicle)
     height = replace(
         linear.outputs[0],
@@ -219,8 +226,12 @@ def test_standard_errors_of_a_run():
         displacement_factors=np.zeros(2),
         road_factors=np.ones(1),
     )
-    road = excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
-    P, a, T = stationary(excited(replace(linear, outputs=(height,)), road, 10.0)).variance[0], 3.0, 200.0
+    road = road_excitation(road_of_level(1.0, corners=(0.3, 0.3)), on_track(wheels(vehicle), 1.0))
+    P, a, T = (
+        stationary_covariance(vehicle_with_road(replace(linear, outputs=(height,)), road, 10.0)).variance[0],
+        3.0,
+        200.0,
+    )
     mean, square = standard_errors(replace(linear, outputs=(height,)), road, 10.0, T)
     assert mean[0] == pytest.approx(np.sqrt(2 * P / (a * T)), rel=0.01)  # ends cost 1 / (a T)
     assert square[0] == pytest.approx(np.sqrt(2 * P**2 / (a * T)), rel=1e-3)

@@ -5,12 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.ensemble.runner import Blocks, each_block
-from models.ensemble.statistics import FAN, deviation, percentiles, quantile
-from models.ensemble.streamed import ACCURACY, Moments, Spread, StreamedCovariance, Tally
+from models.ensemble.statistics import FAN_PERCENTILES, deviation_with_error, percentiles, quantile_with_interval
+from models.ensemble.streamed import QUANTILE_ACCURACY, Moments, Spread, StreamedCovariance, Tally
 
-VALUES = normal(11, 0, 3000 * 4, 1).reshape(1000, 3, 4) * [1.0, 1e3, 1e-6, 1.0] + [0.0, 5e3, 1.0, 1e4]
+VALUES = normal_samples(11, 0, 3000 * 4, 1).reshape(1000, 3, 4) * [1.0, 1e3, 1e-6, 1.0] + [0.0, 5e3, 1.0, 1e4]
 
 
 def streamed(kind, values, cuts):
@@ -25,7 +25,7 @@ def test_moments_and_covariances_are_those_of_all_values(cuts):
     """To rounding of sums about a mean that lies up to 1e6 deviations away: 1e6 eps of a deviation, 1e-10."""
     moments, both = (streamed(kind, VALUES, cuts) for kind in (Moments, StreamedCovariance))
     for place in np.ndindex(3, 4):
-        assert moments.deviation(*place) == pytest.approx(deviation(VALUES[:, *place]), rel=1e-9)
+        assert moments.deviation(*place) == pytest.approx(deviation_with_error(VALUES[:, *place]), rel=1e-9)
     for row in range(3):
         expected = np.cov(VALUES[:, row].T)
         scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -41,25 +41,25 @@ def test_a_correction_that_is_left_out_is_seen():
             self.second = before + ((values - values.mean(axis=0)) ** 2).sum(axis=0)  # no term of the two means
 
     faulty = streamed(Faulty, VALUES, [1, 10, 700])
-    assert faulty.deviation(0, 0) != pytest.approx(deviation(VALUES[:, 0, 0]), rel=1e-4)
+    assert faulty.deviation(0, 0) != pytest.approx(deviation_with_error(VALUES[:, 0, 0]), rel=1e-4)
 
 
 @pytest.mark.parametrize("level", [0.05, 0.5, 0.95])
 def test_quantiles_of_a_grid_are_exact_with_their_intervals(level):
     times = np.round(np.abs(VALUES[:, 0, 0]), 2)
     times[::7] = np.inf
-    assert streamed(Tally, times, [3, 500]).quantile(level) == quantile(times, level)
+    assert streamed(Tally, times, [3, 500]).quantile(level) == quantile_with_interval(times, level)
 
 
 def test_percentiles_are_within_the_stated_share():
     """Of the value of the rank; numpy's lies between two ranks, which here are at most 2 % apart in the middle."""
     errors = VALUES[:, :, 0].copy()
     errors[::10, 1], errors[:, 2] = np.nan, 0.0
-    spread = streamed(Spread, errors, [1, 400]).percentiles(FAN)
-    for i, level in enumerate(FAN):
+    spread = streamed(Spread, errors, [1, 400]).percentiles(FAN_PERCENTILES)
+    for i, level in enumerate(FAN_PERCENTILES):
         for k in (0, 1):
             lower = np.nanpercentile(np.abs(errors[:, k]), level, method="lower")
-            assert spread[i, k] == pytest.approx(lower, rel=1.001 * ACCURACY)
+            assert spread[i, k] == pytest.approx(lower, rel=1.001 * QUANTILE_ACCURACY)
     assert (spread[:, 2] == 0.0).all()
     assert spread[:, 0] == pytest.approx(percentiles(errors)[:, 0], rel=0.05)
 

@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.surfaces import OnRoad, Stretch, Surfaces, check_way, road, under_wheels
 from models.core.errors import InputError
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import stacked_tables
 
-PLANE, ICE = truck(PAPER), surface("ice")
+PLANE, ICE = plane_of_truck(PAPER_TRUCK), table_of_surface("ice")
 KINDS = np.array([0, 0, 1, 1])
 ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], line=0.5, kinds=2)
-FRONT, REAR = PAPER.front.x, PAPER.rear.x
+FRONT, REAR = PAPER_TRUCK.front.x, PAPER_TRUCK.rear.x
 
 
 def under(x, y=0.0, vx=0.0, vy=0.0, step=0.1, own=ROAD):
     """Of each wheel its first and its second table and the share of the second."""
     surfaces = Surfaces(*np.zeros((4, 4)))
-    vehicle = OnRoad(PLANE, KINDS, 0.0, stacked([ICE]), own)
+    vehicle = OnRoad(PLANE, KINDS, 0.0, stacked_tables([ICE]), own)
     under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, vehicle, surfaces)
     return np.column_stack((surfaces.first, surfaces.second, surfaces.share))
 

@@ -3,7 +3,7 @@
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_file import changed
+from models.core.scene_file import changed_tables
 from models.ensemble.store import named_files
 from studies.command.summary_numbers import summary_scalars
 from studies.command.sweep import parse_range
@@ -92,11 +92,11 @@ def test_numbers_of_a_summary_have_names_and_units():
 def test_a_key_counts_the_entries_of_lists_from_nought(tmp_path):
     scene = tmp_path / "mine.toml"
     scene.write_text('title = "mine"\nroad = [{ left = "ice" }, { left = "snow", at = [1, 2] }]\n')
-    found = changed(scene, ["road.1.left=dry", "road.1.at.0=5"])
+    found = changed_tables(scene, ["road.1.left=dry", "road.1.at.0=5"])
     assert found["road"] == [{"left": "ice"}, {"left": "dry", "at": [5, 2]}]
     for key in ("road.2.left", "road.-1.left", "road.left", "road.1.at.2", "title.0"):
         with pytest.raises(InputError, match="--set"):
-            changed(scene, [f"{key}=1"])
+            changed_tables(scene, [f"{key}=1"])
 
 
 def test_files_are_found_however_deep_they_are_named(tmp_path):

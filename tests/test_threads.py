@@ -7,7 +7,7 @@ import sys
 import pytest
 from threadpoolctl import threadpool_info
 
-from models.ensemble.workers import processes
+from models.ensemble.workers import process_pool
 from models.machine.threads import VARIABLES
 
 
@@ -31,7 +31,7 @@ def told(begin, **settings):
 
 def test_this_process_and_its_workers():
     assert counts() and set(counts()) == {1}
-    with processes(1) as pool:
+    with process_pool(1) as pool:
         assert set(pool.submit(counts).result()) == {1}
 
 

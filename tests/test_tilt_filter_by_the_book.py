@@ -5,7 +5,7 @@ import pytest
 
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _without_slope, estimate, pulled
+from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter, _without_slope, estimate, inputs_with_moments
 from models.systems.hub_forces.tilt_march import Noise, march
 from models.vehicles.cut_vehicle import rigid
 from validation.spatial.cars import r19
@@ -74,10 +74,10 @@ def test_the_filter_of_a_measurement_has_the_moments_and_deviations_of_its_vehic
     tilt = estimate(car, forces, angles, stated)
     assert tilt.states == pytest.approx(states, rel=1e-9, abs=1e-12) and tilt.period == DT
     assert tilt.deviations == pytest.approx(deviations, rel=1e-9)
-    assert tilt.surprise == pytest.approx(squares / (4 * (SAMPLES - 1)), rel=1e-9)
+    assert tilt.normalised_innovation == pytest.approx(squares / (4 * (SAMPLES - 1)), rel=1e-9)
     whole = TiltFilter(car, forces.frame, DT, stated)
     assert whole.advance(forces.samples, angles.samples)[0] == pytest.approx(states, rel=1e-9, abs=1e-12)
-    assert whole.surprise == pytest.approx(tilt.surprise, rel=1e-12)
+    assert whole.normalised_innovation == pytest.approx(tilt.normalised_innovation, rel=1e-12)
 
 
 def test_biases_are_means_of_the_innovations_with_fewer_of_them_where_they_hang_together(measurement):
@@ -85,7 +85,7 @@ def test_biases_are_means_of_the_innovations_with_fewer_of_them_where_they_hang_
     car, forces, *_ = measurement
     whole = TiltFilter(car, forces.frame, DT, Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
     whole.state.sums[:] = np.array([4.0, 6.0, 20.0, 5.0, 0.0])[:, None]
-    mean, error = whole.biases()
+    mean, error = whole.innovation_biases()
     assert mean == pytest.approx([1.5] * 4, rel=1e-12)
     assert error == pytest.approx([np.sqrt(2.75 * 1.25 / 0.75 / 4.0)] * 4, rel=1e-12)
 
@@ -100,7 +100,7 @@ def test_what_pulls_to_the_estimate_is_a_spring_and_a_damper_of_its_bandwidth(me
     """I wc^2 and 2 0.7 I wc of roll and pitch; between samples the guide goes along lines."""
     car, forces, _, angles = measurement
     tilt = estimate(car, forces, angles, Deviations(np.full(24, 8.0), (2e-3, 3e-3), 0.7))
-    given = pulled(HubInputs(np.ones((5, 24))), car, tilt, DT, 0.35)
+    given = inputs_with_moments(HubInputs(np.ones((5, 24))), car, tilt, DT, 0.35)
     roll, pitch, _ = np.diag(rigid(car).inertia)
     corner = 2.0 * np.pi * 0.35
     stiff = (roll * corner**2, 1.4 * roll * corner, pitch * corner**2, 1.4 * pitch * corner)

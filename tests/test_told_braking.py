@@ -10,8 +10,8 @@ from models.core.assumptions import broken_of
 from models.core.discretisation import errors_of
 from models.core.scene_file import parse
 from models.systems.braking import errors
-from models.systems.braking.errors import motion_and_distance, observed
-from models.systems.braking.of_scene import merged
+from models.systems.braking.errors import motion_and_distance, observed_order_of_stop
+from models.systems.braking.of_scene import merged_tables
 from models.systems.braking.plan import describe
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
@@ -66,7 +66,7 @@ ENGINES = {"loads at rest": "mujoco", "stop": "exudyn", "parallel steering": "ex
 def scene(*changes):
     table = PLAIN
     for change in changes:
-        table = merged(table, change)
+        table = merged_tables(table, change)
     return build({key: value for key, value in table.items() if value is not None}, "s.toml")
 
 
@@ -143,7 +143,7 @@ def test_no_error_is_asked_for_by_itself():
 def test_orders_are_observed_of_any_numbers_of_steps():
     for order in (0.8, 1.4):
         errs = [count**-order for count in (6, 3, 1)]
-        assert observed(errs[1] - errs[0], errs[2] - errs[1], [6, 3, 1]) == pytest.approx(order, abs=0.03)
+        assert observed_order_of_stop(errs[1] - errs[0], errs[2] - errs[1], [6, 3, 1]) == pytest.approx(order, abs=0.03)
 
 
 @pytest.mark.parametrize(

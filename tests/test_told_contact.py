@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from models.core.assumptions import broken_of
-from models.core.discretisation import CELLS, error_lines, errors_of
+from models.core.discretisation import CELLS_NOTE, error_lines, errors_of
 from models.core.errors import RunFailed
 from models.systems.contact import plan
 from models.systems.contact.run import run
 from models.systems.contact.scene import build
-from models.systems.contact.stated_error import rms
+from models.systems.contact.stated_error import finite_rms
 from models.systems.wheel_rail import plan as held_plan
 from models.systems.wheel_rail import run as wheel_rail
 from models.systems.wheel_rail.scene import build as held
-from studies.command.asked import SCENES, load_scene
+from studies.command.asked import SCENES_FOLDER, load_scene
 from validation.stated_errors.systems.contact import samples
 
 SCENE = {
@@ -75,7 +75,7 @@ def test_rows_of_a_table_are_judged(tmp_path):
     table = {"title": "t", "system": "contact", "cases": {"file": "c.csv"}, "method": {"cells": 21}}
     answered = run(build(table, "t.toml", tmp_path), answers=tmp_path / "out.csv")
     assert names(answered) == {"axes alike", "elastic", "small creepage", "constant friction"}
-    assert all(0.0 < one.share < 0.5 for one in broken_of(answered)) and errors_of(answered)["force"].of == CELLS
+    assert all(0.0 < one.share < 0.5 for one in broken_of(answered)) and errors_of(answered)["force"].of == CELLS_NOTE
     run(build(table, "t.toml", tmp_path), answers=tmp_path / "bare.csv", error=False)
     assert "error" not in (tmp_path / "bare.csv").read_text().splitlines()[0]
 
@@ -85,7 +85,7 @@ def test_shipped_scenes_break_nothing_and_are_listed(name):
     shipped = load_scene(name, ["method.cells=15"])
     assert names(run(shipped, error=False)) == set()
     assert "  assumes    the steel does not flow (at most 2700 MPa)" in plan.describe(shipped)
-    assert (SCENES / f"{name}.toml").exists()
+    assert (SCENES_FOLDER / f"{name}.toml").exists()
 
 
 def test_the_error_of_cells_is_that_against_ten_times_as_many():
@@ -112,7 +112,7 @@ def test_errors_of_cells_and_of_theory_are_both_told_and_neither_when_not_asked(
 def test_cells_that_are_too_few_are_warned_of_with_those_to_use():
     coarse = run(scene(method={"cells": 5}))
     (worst, *_), line = errors_of(coarse).values(), error_lines(coarse)[0]
-    assert "WARNING, use at least" in line and line.endswith(CELLS)
+    assert "WARNING, use at least" in line and line.endswith(CELLS_NOTE)
     finer = run(scene(method={"cells": int(worst.step)}))
     assert errors_of(finer)["force"].share < 0.3 * worst.share and "WARNING" not in error_lines(finer)[0]
 
@@ -135,11 +135,11 @@ def test_a_held_wheelset_that_slips_fast_is_told():
 def test_the_error_of_a_held_wheelset_is_that_against_four_times_the_cells():
     some = held(STEEL | {"positions": {"start": 0.002, "stop": 0.008, "count": 3}, "method": {"cells": 15}})
     told = errors_of(run_ := wheel_rail.run(some, error=True))
-    finer = replace(some.contact(some.cases["A"]), coarser=0.25 * 31 / 15)
+    finer = replace(some.contact(some.cases["A"]), cell_factor=0.25 * 31 / 15)
     placed = run_.detail.placed
-    gaps = [wheel_rail.sums(one) - wheel_rail.sums(finer.at(one.shift, one.yaw)) for one in placed]
-    for k, name in enumerate(wheel_rail.SUMS):
-        assert rms(np.array(gaps)[:, :, k]) < 3.0 * told[name].error
+    gaps = [wheel_rail.wheel_sums(one) - wheel_rail.wheel_sums(finer.at(one.shift, one.yaw)) for one in placed]
+    for k, name in enumerate(wheel_rail.WHEEL_QUANTITIES):
+        assert finite_rms(np.array(gaps)[:, :, k]) < 3.0 * told[name].error
 
 
 def test_an_error_beyond_all_measure_is_refused_with_the_cells_to_use(monkeypatch):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from models.core.assumptions import assumed_of, broken_of
-from models.core.discretisation import WARNED, error_lines, errors_of
+from models.core.discretisation import WARNED_SHARE, error_lines, errors_of
 from models.core.errors import RunFailed
 from models.core.systems import load
 from models.systems.handling import run as module
 from models.systems.handling.plan import describe
-from models.systems.handling.run import principal, run
+from models.systems.handling.run import principal_series, run
 from models.systems.handling.scene import HandlingScene, build
 
 SHIPPED = Path(__file__).parents[1] / "studies" / "scenes" / "handling.toml"
@@ -80,7 +80,7 @@ def test_the_error_that_is_told_is_that_of_steps_and_cells(step, cells):
     own = scene(step, cells, steer=[[0.05, 0.0], [0.4, 0.05]], brake=[[0.1, 0.0], [0.3, 900.0]], duration=0.4)
     told = run(own, "mujoco", error=True)
     fine = run(scene(step / 2, 8 * cells, **own.manoeuvres["own"].model_dump()), "mujoco")
-    mine, truth = (principal(each.detail).channels for each in (told, fine))
+    mine, truth = (principal_series(each.detail).channels for each in (told, fine))
     worst = max(errors_of(told), key=lambda name: errors_of(told)[name].share)
     true = float(np.sqrt(np.mean((mine[worst] - truth[worst][::2]) ** 2)))
     assert true / 3.0 < errors_of(told)[worst].error < 10.0 * true
@@ -101,7 +101,7 @@ def test_few_cells_are_a_warning_with_those_to_use():
     worst = max(errors_of(told).values(), key=lambda one: one.share)
     assert worst.warned and error_lines(told)[0].endswith(f"use at least {worst.step:g} tyres.cells")
     cured = run(scene(1e-3, round(worst.step), **own.manoeuvres["own"].model_dump()), "mujoco", error=True)
-    assert max(one.share for one in errors_of(cured).values()) < WARNED
+    assert max(one.share for one in errors_of(cured).values()) < WARNED_SHARE
 
 
 def test_no_error_costs_no_run(monkeypatch):

@@ -15,8 +15,8 @@ from models.systems.braking.scene import build as build_braking
 from models.systems.hub_forces import run as module
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.plan import describe
-from models.systems.hub_forces.run import principal, run
-from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene, build
+from models.systems.hub_forces.run import principal_series, run
+from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene, build
 from models.systems.measured.run import run as run_recording
 from models.systems.measured.scene import build as recording
 from models.tyre.assumptions import assumptions as of_table
@@ -42,10 +42,12 @@ def filed(folder: Path, factor: float = 1.0, lift: float = 0.0, **tables: dict) 
     columns = {
         f"{hub}_{name}": (next(iter(units)), (name == "fz") * (factor * load + lift * pulse * (hub == "fl")))
         for hub, load in zip(CAR.hubs, CAR.loads, strict=True)
-        for name, units in COMPONENTS.items()
+        for name, units in COLUMNS_OF_HUB.items()
     }
     write_time_series(folder / "forces.csv", columns, 2e-3)
-    write_time_series(folder / "angles.csv", {n: (next(iter(u)), 0.0 * times) for n, u in ANGLES.items()}, 2e-3)
+    write_time_series(
+        folder / "angles.csv", {n: (next(iter(u)), 0.0 * times) for n, u in COLUMNS_OF_ANGLES.items()}, 2e-3
+    )
     accept = {"accept": ["weight", "clipped", "gain", "offset", "lever", "unit", "turning", "noise"]}
     table = {"title": "t", "system": "hub-forces", "vehicle": {"file": "r19_free"}, "angles": {"file": "angles.csv"}}
     table |= {"run": {"duration": 1.0, "step": 2e-3}, "forces": {"file": "forces.csv", **accept}}
@@ -91,7 +93,7 @@ def test_forces_out_of_balance_and_a_vehicle_that_turns_are_told(tmp_path):
 def test_the_measurement_itself_is_judged_and_show_lists_all():
     own = scene({"iso8608": "H", "speed": 30.0})
     measurement = module.measure(own, "mujoco")
-    true = {one.name: one for one in broken_of(module.labelled(measurement, measurement.truth, "mujoco"))}
+    true = {one.name: one for one in broken_of(module.labelled_result(measurement, measurement.truth, "mujoco"))}
     assert {"tyres press", "springs between stops", "side forces"} <= set(true)
     assert 'system = "handling"' in true["side forces"].remedy
     assert all(line in describe(own) for line in assumed_of(run(own, "mujoco", measurement=measurement)))
@@ -108,7 +110,7 @@ def test_the_error_that_is_told_is_that_of_measurement_and_run(step, rate, metho
         return run(scene({"speed": 25.0}, forces={"sampling_rate": rate}, **tables), "mujoco", error=error)
 
     own, fine = made(step, True), made(step / 8, False)
-    mine, truth = (principal(CAR, each.detail).channels for each in (own, fine))
+    mine, truth = (principal_series(CAR, each.detail).channels for each in (own, fine))
     name, one = max(errors_of(own).items(), key=lambda each: each[1].share)
     true = float(np.sqrt(np.mean((mine[name] - truth[name][::8]) ** 2)))
     assert true / 3.0 < one.error < 10.0 * true and one.unit == "N"
@@ -128,10 +130,10 @@ def test_no_error_costs_no_run_and_a_comparison_tells_of_all(monkeypatch):
     monkeypatch.setattr(module, "HubModel", lambda *model: models.append(model) or model_of(*model))
     own = scene()
     plain = compare(own.model_copy(update={"error": False}), ("mujoco",))
-    assert len(models) == 4 and not calls and told.lines(plain.results) == []  # the measurement, and three runs
+    assert len(models) == 4 and not calls and told.message_lines(plain.results) == []  # the measurement, and three runs
     whole = compare(own, ("mujoco",))
     assert set(whole.results) == {"true", "free, mujoco", "filter", "prescribed"}
-    assert all(errors_of(each) for each in whole.results.values()) and len(told.lines(whole.results)) == 4
+    assert all(errors_of(each) for each in whole.results.values()) and len(told.message_lines(whole.results)) == 4
     steps = [round(model[4] / model[3]) for model in calls]
     assert sum(steps) / 1200 <= 1.6  # 0.6 of the four runs of 300 steps each
 
@@ -169,7 +171,7 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
     table = {"title": "t", "system": "braking", "procedures": {"straight": {}}, "study": "tyre"}
     own = build_braking({**table, "road": {"stretches": [{"left": "ice"}]}}, "s.toml", tmp_path)
     results = read_tyre(own, (), tmp_path, lambda what, share: None)["results"]
-    assert broken_of(results["ice"]) == [] and "a table has no steps" in told.lines(results)[0]
+    assert broken_of(results["ice"]) == [] and "a table has no steps" in told.message_lines(results)[0]
     whole = table_of(own, "ice")
     short = whole.refined(whole.angles[:3], whole.slips, np.array([5e3, 2e4]))
     beyond = {one.name: one for one in broken_of(with_assumptions(results["ice"], of_table(short, 3e4)))}

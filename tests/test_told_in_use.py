@@ -10,21 +10,21 @@ import pytest
 from models.advice.choice.choose import Chooser
 from models.advice.price.runner import attempt
 from models.core import told
-from models.core.assumptions import breaches, broken_of
-from models.core.discretisation import Estimate, errors_of, stated
+from models.core.assumptions import broken_of, collected_breaches
+from models.core.discretisation import Estimate, errors_of, with_stated_errors
 from models.core.systems import load
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
-from studies.choice import chosen, lines
+from studies.choice import choice_lines, choice_of_scene
 from studies.command import sweep
 from studies.command.comparison import compare, report
-from studies.command.sweep_figure import BROKEN, WARNING, Swept, draw_sweep
+from studies.command.sweep_figure import BROKEN_MARK, WARNING_MARK, SweepResults, draw_sweep
 from studies.command_line import app
 from validation.cases import stated_errors
-from validation.common.grounds import allowing
-from validation.common.rows import Observed, not_run, rested
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import Observed, not_run, rows_on_grounds
 from validation.price.problems import road_excited
-from validation.report.page import allowances
+from validation.report.page import allowed_assumptions
 from validation.stated_errors.sample import Sample
 
 ROAD = {"road": {"source": "study", "speed": 20.0}}
@@ -78,37 +78,37 @@ def test_a_sweep_tells_in_table_columns_json_and_code(tmp_path, monkeypatch, cap
     saved = json.loads((tmp_path / "a" / "sweep.json").read_text())["results"]
     estimates = saved[1]["errors"]["reference"]["channels"].values()
     assert float(broken["largest error [-]"]) == max(one["share"] for one in estimates)
-    quick = sweep.points("effects.road.speed=5,20", asked[0], (), "reference", error=False)
+    quick = sweep.sweep_points("effects.road.speed=5,20", asked[0], (), "reference", error=False)
     said = replace(quick, folder=tmp_path / "b").record(1)["results"]["reference"]
     assert said["error"] == "{}" and "tyres press" in said["assumptions"]
 
 
 def test_curves_have_marks_at_the_points_of_their_own_engine(tmp_path, monkeypatch, pulling, pressing):
     rough = type(pulling)(pulling.data.copy())
-    stated(rough, {"f1": Estimate(3.0, "N", 0.1, 4.0, 1e-3)}, "hand")
+    with_stated_errors(rough, {"f1": Estimate(3.0, "N", 0.1, 4.0, 1e-3)}, "hand")
     rough.data.attrs["engine"] = "mujoco"
     results = [{"reference": pressing, "mujoco": pressing}, {"reference": pulling, "mujoco": rough}]
     columns = {"reference, f1": [1.0, 2.0], "mujoco, f1": [1.5, 2.5]}
-    swept = Swept("s.toml", "k", (1, 2), columns, [{}, {}], results)
+    swept = SweepResults("s.toml", "k", (1, 2), columns, [{}, {}], results)
     seen = []
     monkeypatch.setattr("studies.command.sweep_figure.save", lambda figure, path: seen.append(figure))
     draw_sweep(swept, tmp_path)
     marks = {line.get_label(): line.get_xydata().tolist() for line in seen[0].axes[0].lines}
-    assert marks[WARNING["label"]] == [[2.0, 2.5]] and [2.0, 2.5] in marks[BROKEN["label"]]
-    assert swept.broken("reference") == [1] and swept.warned("reference") == []
+    assert marks[WARNING_MARK["label"]] == [[2.0, 2.5]] and [2.0, 2.5] in marks[BROKEN_MARK["label"]]
+    assert swept.broken_points("reference") == [1] and swept.warned_points("reference") == []
 
 
 def test_what_results_say_survives_json(pulling):
-    said = json.loads(json.dumps(told.attributes({"reference": pulling})))
-    (copy,) = told.speaking(said).values()
+    said = json.loads(json.dumps(told.attributes_for_json({"reference": pulling})))
+    (copy,) = told.results_with_attributes(said).values()
     assert broken_of(copy) == broken_of(pulling) and errors_of(copy) == errors_of(pulling)
 
 
 def test_many_results_are_told_in_few_lines(pulling):
     rough = [type(pulling)(pulling.data.copy()) for _ in range(9)]
     for i, one in enumerate(rough):
-        stated(one, {"f1": Estimate(3.0, "N", 0.03 + 0.01 * i, 4.0, 1e-3)}, "hand")
-    said = told.lines({f"k={i}": one for i, one in enumerate(rough)})
+        with_stated_errors(one, {"f1": Estimate(3.0, "N", 0.03 + 0.01 * i, 4.0, 1e-3)}, "hand")
+    said = told.message_lines({f"k={i}": one for i, one in enumerate(rough)})
     assert said[0].startswith("  9 results, the largest error k=8: error at most 11 %") and "WARNING" in said[0]
     assert said[1] == "  errors above 2 % in 9 of 9: k=0, k=1, k=2, k=3 and 5 more" and "and 5 more: ass" in said[2]
 
@@ -125,7 +125,7 @@ def test_a_difference_below_the_stated_errors_is_called_so(tmp_path, pulling):
     summary = report(tmp_path / "a.nc", tmp_path / "b.nc", tmp_path)
     assert summary["within the stated error"] == ["f1"] and len(summary["results"]) == 2
     assert any("f1 " in line and "rms within the stated error of" in line for line in summary["table"])
-    assert any("assumption broken" in line for line in told.lines(summary["results"]))
+    assert any("assumption broken" in line for line in told.message_lines(summary["results"]))
     assert "stated error of both" in (tmp_path / "compare.csv").read_text().splitlines()[0]
 
 
@@ -148,20 +148,26 @@ speed = 20.0
 def test_a_choice_keeps_what_the_assumptions_need_and_states_its_error(tmp_path):
     (tmp_path / "s.toml").write_text(CHOICE)
     scene = load(tmp_path / "s.toml")
-    found = chosen(scene, ())
-    assert "lift_off" in found.stay and {one.name for one in found.choice.barred["lift_off"]} >= {"tyres press"}
-    said = "\n".join(lines(found, False))
+    found = choice_of_scene(scene, ())
+    assert "lift_off" in found.staying_effects and {
+        one.name for one in found.choice.assumptions_barring["lift_off"]
+    } >= {"tyres press"}
+    said = "\n".join(choice_lines(found, False))
     assert "lift_off stays; without it an assumption would be broken: linear tyres stay on the road" in said
     (left,) = found.results
     assert errors_of(left) and broken_of(left) == []
     monkey = Chooser(scene, "reference", scene.quantities, scene.tolerance)
-    monkey.barred = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
-    assert not monkey.holds(monkey.confirm(frozenset(["lift_off"])))
+    monkey.breaks_assumption = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
+    assert not monkey.within_tolerance(monkey.confirm(frozenset(["lift_off"])))
 
 
 def test_points_of_work_precision_curves_are_marked():
     problem = object.__new__(road_excited.RoadExcited)
-    problem.assembly, problem.units, problem.bound = road_excited.assemble(road_excited.scene()), {"q": "N"}, 1.0
+    problem.assembly, problem.units, problem.bound = (
+        road_excited.assembly_of_scene(road_excited.scene()),
+        {"q": "N"},
+        1.0,
+    )
     problem.errors = lambda run: (road_excited.judge(problem.assembly, run), {"q": 0.1})[1]
     point = attempt(problem, road_excited.setting("reference", "RK4", 2e-3))
     assert point.status == "ok" and "linear tyres stay on the road" in point.broken
@@ -173,19 +179,19 @@ def of(value, id="case.row"):
 
 def test_a_row_that_rests_on_a_tyre_that_pulls_fails():
     """The planted fault: a case whose run lifts a tyre."""
-    rows, _ = rested("case", lambda: ([of(float(simulate()["f1"].max()))], {}))
+    rows, _ = rows_on_grounds("case", lambda: ([of(float(simulate()["f1"].max()))], {}))
     assert rows[0].status == "failed" and "rests on a broken assumption: linear tyres stay on" in rows[0].reason
 
 
 def again(result):
     """Judge a result once more."""
     from models.systems.pitch_plane.assumptions import assumptions
-    from models.systems.pitch_plane.scene import assemble
+    from models.systems.pitch_plane.scene import assembly_of_scene
 
     scene = build({"title": "t", "vehicle": {"parameters": "itwm_drift"}, "run": {"duration": 1.5}, "effects": ROAD})
     from models.core.assumptions import with_assumptions
 
-    return with_assumptions(result, assumptions(assemble(scene)))
+    return with_assumptions(result, assumptions(assembly_of_scene(scene)))
 
 
 def test_rows_rest_on_the_runs_before_them_alone(pulling, pressing):
@@ -199,7 +205,7 @@ def test_rows_rest_on_the_runs_before_them_alone(pulling, pressing):
         rows += [of(2.0)]
         return [*rows, *part(pressing)], {}
 
-    rows, _ = rested("case", measure)
+    rows, _ = rows_on_grounds("case", measure)
     assert [row.status for row in rows] == [
         *("passed", "passed", "reported", "not run"),
         *("failed", "failed", "not run"),
@@ -211,28 +217,28 @@ def test_runs_whose_rows_are_made_elsewhere_are_not_lost(pulling):
     def both():
         return again(pulling)
 
-    rows, _ = rested("case", lambda: (((lambda run: [of(1.0)])(both())), {}))
+    rows, _ = rows_on_grounds("case", lambda: (((lambda run: [of(1.0)])(both())), {}))
     assert rows[0].status == "failed"
-    rows, _ = rested("case", lambda: ([of(1.0)], {"late": bool(both())}))
+    rows, _ = rows_on_grounds("case", lambda: ([of(1.0)], {"late": bool(both())}))
     assert [(row.id, row.status) for row in rows] == [("case.row", "passed"), ("case.assumptions", "failed")]
 
 
 def test_what_a_case_allows_is_told_with_its_reason(pulling):
-    @allowing("the linear tyre is what is shown", "tyres press", "springs compressed")
+    @allowing_breaches("the linear tyre is what is shown", "tyres press", "springs compressed")
     def measure():
         again(pulling)
         return [of(1.0)], {}
 
-    (row,), _ = rested("case", measure)
+    (row,), _ = rows_on_grounds("case", measure)
     assert row.status == "passed" and row.broken == "" and row.allowed.endswith(": the linear tyre is what is shown")
-    assert allowances([row.as_dict()]) == [(row.allowed, [row.as_dict()])]
-    with allowing("another one", "small angles"):
-        (row,), _ = rested("case", lambda: ([of(float(bool(again(pulling))))], {}))
+    assert allowed_assumptions([row.as_dict()]) == [(row.allowed, [row.as_dict()])]
+    with allowing_breaches("another one", "small angles"):
+        (row,), _ = rows_on_grounds("case", lambda: ([of(float(bool(again(pulling))))], {}))
     assert row.status == "failed"
 
 
 def test_inner_watches_keep_what_they_see(pulling):
-    with breaches() as outer, breaches() as inner:
+    with collected_breaches() as outer, collected_breaches() as inner:
         again(pulling)
     assert "tyres press" in inner and not outer
 
@@ -276,5 +282,5 @@ def test_all_systems_that_have_samples_are_found_and_shown(monkeypatch, tmp_path
 def test_results_of_engines_are_not_of_others(pulling):
     other = replace(pulling, data=pulling.data.copy())
     other.data.attrs["engine"] = "exudyn"
-    swept = Swept("s", "k", (1,), {}, [{}], [{"exudyn": other}])
-    assert swept.broken("mujoco") == [] and swept.broken("exudyn") == [0] == swept.broken("")[0:1]
+    swept = SweepResults("s", "k", (1,), {}, [{}], [{"exudyn": other}])
+    assert swept.broken_points("mujoco") == [] and swept.broken_points("exudyn") == [0] == swept.broken_points("")[0:1]

@@ -17,7 +17,7 @@ from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.trust import small_errors
 from models.vehicles.parameters.itwm_drift import PARAMETERS as P
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 
 LOAD = 0.5 * P.m3 * P.g + P.m1 * P.g
 """N on each axle of the paper's vehicle at rest."""
@@ -165,8 +165,8 @@ def test_a_motion_that_no_angles_and_no_samples_tell(files):
 
 def within(assumption):
     """Whether what is watched of a motion stays where it may."""
-    values = np.concatenate(list(assumption.watched(None).values()))
-    return bool(((values >= assumption.least) & (values <= assumption.most)).all())
+    values = np.concatenate(list(assumption.watched_values(None).values()))
+    return bool(((values >= assumption.lower_limit) & (values <= assumption.upper_limit)).all())
 
 
 def test_a_trust_in_large_errors_is_told():
@@ -227,7 +227,7 @@ def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
     )
     true = 1e-3 * float(np.sqrt(np.mean(fine.times**4)))
     assert errors_of(estimated(made, fine, drifting, 2, 0.01))["z3"].error == pytest.approx(true, rel=0.3)
-    monkeypatch.setattr(discretisation, "_later", lambda gap, values: 1.0)
+    monkeypatch.setattr(discretisation, "_growth_after_window", lambda gap, values: 1.0)
     assert errors_of(estimated(made, fine, drifting, 2, 0.01))["z3"].error < true / 3.0
 
 
@@ -251,7 +251,7 @@ SAYS_SO = {"tyres press", "springs compressed"}
 
 @pytest.mark.parametrize(("name", "allowed"), [("study_road", set()), ("iso_road", set()), ("release", SAYS_SO)])
 def test_shipped_scenes_raise_no_alarm_that_they_do_not_speak_of(name, allowed):
-    shipped = load(SCENES / f"{name}.toml")
+    shipped = load(SCENES_FOLDER / f"{name}.toml")
     made = run(shipped, "reference", error=True)
     assert {breach.name for breach in broken_of(made)} == allowed and not worst_of(made).warned
-    assert not allowed or "for 3 % of the time" in (SCENES / f"{name}.toml").read_text()
+    assert not allowed or "for 3 % of the time" in (SCENES_FOLDER / f"{name}.toml").read_text()

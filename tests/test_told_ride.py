@@ -17,7 +17,7 @@ from models.systems.ride.run import run
 from models.systems.ride.scene import build
 from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import wheels
-from validation.stated_errors.systems.ride import exact, samples
+from validation.stated_errors.systems.ride import exact_deviations, samples
 
 ENGINES = ("reference", "exudyn", "mujoco")
 SHORT = Sampling(copies=20, lasting=2.0, driven=3.0, skipped=0.5)
@@ -122,7 +122,7 @@ def of_rounding(engine):
     given = scene(speeds={"values": [3.3, 17.0, 41.0]})
     result, vehicle = run(given, engine, error=True), vehicle_of(given)
     road, linear = excitation_of(given, wheels(vehicle)), linear_vehicle(vehicle)
-    true = np.array([exact(linear(float(v)), road, float(v)) for v in result["speed"]])
+    true = np.array([exact_deviations(linear(float(v)), road, float(v)) for v in result["speed"]])
     gaps = np.sqrt(np.mean((result["deviation"][0] - true) ** 2, axis=0))
     assert len(errors_of(result)) == len(gaps) and errors_of(run(given, engine)) == {}
     return [float(gap / one.error) for gap, one in zip(gaps, errors_of(result).values(), strict=True)]
@@ -134,8 +134,8 @@ def test_rounding_of_a_covariance_is_told(engine):
 
 
 def test_an_estimate_that_is_too_small_is_caught(monkeypatch):
-    monkeypatch.setattr(errors, "SAFETY", 1e-3)
-    monkeypatch.setattr(errors, "DIGIT", 1e-19)
+    monkeypatch.setattr(errors, "SAFETY_FACTOR", 1e-3)
+    monkeypatch.setattr(errors, "MATRIX_ACCURACY", 1e-19)
     assert max(of_rounding("reference")) > 3.0
 
 
@@ -151,7 +151,7 @@ def test_a_step_too_long_is_refused_and_the_advised_one_accepted():
 def with_refusals_early(work):
     """The answer, errors of 2 % refused: where they would be half of it, engines refuse the step before."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(discretisation, "REFUSED", 0.02)
+        patch.setattr(discretisation, "REFUSED_SHARE", 0.02)
         return work()
 
 
@@ -167,7 +167,7 @@ def test_copies_state_steps_chance_and_what_gains_miss():
     result = run(given, "reference", sampling=SHORT, error=True)
     channels = errors_of(result)
     assert 0.0 < channels["body front, copies"].share < 0.01 and 0.0 < channels["body front, gains"].share < 0.5
-    text = "\n".join(told.lines({"reference": result}))
+    text = "\n".join(told.message_lines({"reference": result}))
     assert "standard error of 20 paths" in text
 
 

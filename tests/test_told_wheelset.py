@@ -7,14 +7,14 @@ import pytest
 
 from models.core import told
 from models.core.assumptions import broken_of
-from models.core.discretisation import CELLS, error_lines, errors_of
+from models.core.discretisation import CELLS_NOTE, error_lines, errors_of
 from models.core.errors import RunFailed
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.wheelset import plan
 from models.systems.wheelset import run as system
-from models.systems.wheelset.run import cycles, linearised, over_speeds, run
+from models.systems.wheelset.run import cycles_of_engines, linearised_result, over_speeds, run
 from models.systems.wheelset.scene import build
-from models.systems.wheelset.stated_error import series
+from models.systems.wheelset.stated_error import principal_series
 from studies.command.asked import load_scene
 from validation.stated_errors.systems.wheelset import samples
 
@@ -70,7 +70,7 @@ def test_a_creeping_wheelset_is_told_of_its_speed():
 
 
 def test_a_soft_wheelset_is_no_half_space_and_one_of_steel_is(tmp_path):
-    values = CHOSEN.changed(load=12000.0).model_dump(exclude={"material", "profiles"})
+    values = CHOSEN_WHEELSET.changed(load=12000.0).model_dump(exclude={"material", "profiles"})
     lines = "\n".join(f"{key} = {value!r}" for key, value in values.items())
     found = []
     for name, modulus in (("soft", 2e6), ("steel", 2.1e11)):
@@ -82,7 +82,7 @@ def test_a_soft_wheelset_is_no_half_space_and_one_of_steel_is(tmp_path):
 
 def test_without_friction_eigenvalues_say_so():
     smooth, rough = (
-        linearised(scene(wheelset={"override": {"friction": friction}}), "reference") for friction in (0.0, 0.3)
+        linearised_result(scene(wheelset={"override": {"friction": friction}}), "reference") for friction in (0.0, 0.3)
     )
     assert names(smooth) == {"friction"} and names(rough) == set()
 
@@ -91,7 +91,7 @@ def test_without_friction_eigenvalues_say_so():
 def test_steps_and_cells_are_both_told_by_every_engine(engine):
     result = run(scene(), engine, error=True)
     of = {one.of for one in errors_of(result).values()}
-    assert of == {"", CELLS} and len(error_lines(result)) == 2 and errors_of(run(scene(), engine)) == {}
+    assert of == {"", CELLS_NOTE} and len(error_lines(result)) == 2 and errors_of(run(scene(), engine)) == {}
 
 
 @pytest.mark.full
@@ -104,7 +104,7 @@ def test_an_estimate_that_leaves_the_cells_out_would_be_caught():
     """Planted fault: steps alone tell less than a tenth of what a path on few cells errs by."""
     result = run(scene(), "reference", error=True)
     true = run(scene(contact={"cells": 70}), "reference")
-    gap = series(result.detail).channels["y"] - series(true.detail).channels["y"]
+    gap = principal_series(result.detail).channels["y"] - principal_series(true.detail).channels["y"]
     error = float(np.sqrt(np.mean(gap**2)))
     assert errors_of(result)["y"].error < 0.1 * error < errors_of(result)["y of cells"].error
 
@@ -130,14 +130,14 @@ def test_joined_paths_keep_what_each_says():
 
 def test_a_limit_cycle_tells_its_error_and_what_it_takes_for_granted():
     hunts = scene(wheelset={"override": {"conicity": 0.15, "stiffness_x": 8e5}}, contact={"cells": 5})
-    found, failed = cycles(hunts, ("reference",), 67.0, error=True)
+    found, failed = cycles_of_engines(hunts, ("reference",), 67.0, error=True)
     said = errors_of(found["reference"])
     assert (
         not failed
         and {"amplitude", "frequency", "amplitude of cells"} <= said.keys()
         and names(found["reference"]) == set()
     )
-    finer, _ = cycles(
+    finer, _ = cycles_of_engines(
         hunts.model_copy(update={"contact": hunts.contact.model_copy(update={"cells": 40})}), ("reference",), 67.0
     )
     true = abs(finer["reference"].detail.amplitude - found["reference"].detail.amplitude)

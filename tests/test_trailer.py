@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named_effects, without
+from models.core.scene_effects import named_effects, scene_without
 from models.engines.free_vehicle import built_share, free_model
 from models.engines.towed_springs import divided, numbers_beside
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
-from models.systems.handling.energy import energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted
 from models.systems.handling.plan import describe
 from models.systems.handling.run import build as build_model
 from models.systems.handling.run import drive_run, driven_by, run
@@ -23,7 +23,7 @@ from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.common.checks import largest_relative_difference
 from validation.spatial.towing import keep_to_the_car, levers_error, towed_turn
 from validation.spatial.trains import BOX, WHEELS, caravan, train
-from validation.spatial.written_equations import TURN, rolling_cars, rolling_gap
+from validation.spatial.written_equations import TURN_CONTROLS, rolling_cars, rolling_gap
 
 BOUND = 3e-3
 """Of the closed form of a settled turn: what is left of its settling after 3 s."""
@@ -62,8 +62,8 @@ def test_a_steady_turn_is_that_of_the_closed_form_and_wheels_that_keep_to_the_ca
 
 
 def test_energy_is_accounted_for():
-    drive = drive_run("mujoco", Handling(train(), controls=TURN), 20.0, 0.04)
-    assert np.abs(unaccounted(drive)).max() < 1e-7 * energy(drive)[0]
+    drive = drive_run("mujoco", Handling(train(), controls=TURN_CONTROLS), 20.0, 0.04)
+    assert np.abs(unaccounted(drive)).max() < 1e-7 * drive_energy(drive)[0]
 
 
 def test_wheels_of_a_trailer_are_not_driven_nor_steered_and_brake_with_those_behind_the_first_axle():
@@ -77,7 +77,7 @@ def test_wheels_of_a_trailer_are_not_driven_nor_steered_and_brake_with_those_beh
 
 def test_a_scene_names_its_trailer_and_runs_in_both_engines():
     towing = scene()
-    assert "trailer" in named_effects(towing) and "trailer" not in named_effects(without(towing, "trailer"))
+    assert "trailer" in named_effects(towing) and "trailer" not in named_effects(scene_without(towing, "trailer"))
     assert "caravan, towed by body at (-2.4, 0, 0.43) m, turns rx ry rz; 582 N on it" in describe(towing)
     ours, theirs = (run(towing, engine) for engine in ("mujoco", "exudyn"))
     assert np.abs(ours["positions"] - theirs["positions"]).max() < 1e-12
@@ -88,7 +88,7 @@ def test_a_file_of_ones_own_keeps_its_trailer(tmp_path):
     towing = scene(vehicle={"file": str(tmp_path / "mine.toml")})
     assert "trailer" in named_effects(towing)
     with pytest.raises(InputError, match=r"vehicle\.file = .*: has bodies with a hitch: name a vehicle file"):
-        without(towing, "trailer")
+        scene_without(towing, "trailer")
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn"])

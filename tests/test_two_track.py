@@ -9,19 +9,19 @@ from scipy.signal import csd
 
 from models.core.errors import InputError
 from models.road.fitted import fit_road
-from models.road.iso8608 import CLASSES, level_of_class
+from models.road.iso8608 import DENSITY_OF_CLASS, level_of_class
 from models.road.isotropic import DensityPart, IsotropicRoad
-from models.road.measured_tracks import MeasuredTracks, read_tracks, spectra
+from models.road.measured_tracks import MeasuredTracks, read_tracks, track_spectra
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import (
-    CASES,
+    CORRELATION_CASES,
     FRONT_REAR,
     TRACK_CORRELATIONS,
     TwoTrackRoad,
-    excitation,
     half_track,
     input_covariance,
     on_track,
+    road_excitation,
     road_of_level,
 )
 from models.vehicles.linear_vehicle import WheelPosition
@@ -37,7 +37,7 @@ def test_every_row_of_the_case_passes(tmp_path):
 
 @pytest.mark.grounds("closed form")
 def test_a_positive_roll_lifts_the_left_wheels_and_each_has_its_own_arm():
-    road = excitation(ROAD, WHEELS)
+    road = road_excitation(ROAD, WHEELS)
     heights = sum(road.heights) @ np.array([0.0, 1.0])  # z_M = 0, theta = 1 rad: about x forward, left goes up
     assert heights.tolist() == [wheel.y for wheel in WHEELS]
     assert road.lengths == pytest.approx((0.0, 2.6, 3.9))
@@ -46,7 +46,7 @@ def test_a_positive_roll_lifts_the_left_wheels_and_each_has_its_own_arm():
 
 
 def test_equal_tracks_are_those_of_the_left():
-    heights = sum(excitation(ROAD, WHEELS, "equal").heights) @ np.array([0.0, 1.0])
+    heights = sum(road_excitation(ROAD, WHEELS, "equal").heights) @ np.array([0.0, 1.0])
     assert heights.tolist() == [abs(wheel.y) for wheel in WHEELS]
 
 
@@ -56,7 +56,7 @@ def test_delayed_noise_gives_the_delayed_output(case):
     by_noise, by_output = (
         f(*x)
         for f, x in (
-            (heights_covariance, (excitation(ROAD, WHEELS, *case),)),
+            (heights_covariance, (road_excitation(ROAD, WHEELS, *case),)),
             (input_covariance, (ROAD, WHEELS, *case)),
         )
     )
@@ -64,7 +64,7 @@ def test_delayed_noise_gives_the_delayed_output(case):
 
 
 def test_cases_differ_only_where_they_should():
-    case = {number: input_covariance(ROAD, WHEELS, *words) for number, words in CASES.items()}
+    case = {number: input_covariance(ROAD, WHEELS, *words) for number, words in CORRELATION_CASES.items()}
     assert all(np.diag(P) == pytest.approx(np.diag(case[3]), rel=1e-15) for P in case.values())
     assert case[1][0, 2] == 0 and case[4][0, 1] == 0 and case[4][0, 2] == case[3][0, 2] == case[5][0, 2]
     assert case[3][0, 1] == pytest.approx(5e-5 / 0.6 - 0.7 * 0.6 * 8e-5 / 3.0, rel=1e-14)  # q1/2O1 - b1 b2 q2/2O2
@@ -94,7 +94,7 @@ def test_a_quarter_car_meets_a_track_and_not_the_mean():
 def test_a_class_keeps_its_variance_when_its_density_changes_sides():
     """One-sided over waves per metre and two-sided over rad/m: the same band has the same variance."""
     low, high = 0.05, 2.0
-    one_sided = CLASSES["C"] * 0.1**2 * (1 / low - 1 / high)
+    one_sided = DENSITY_OF_CLASS["C"] * 0.1**2 * (1 / low - 1 / high)
     two_sided = 2 * level_of_class("C") * (1 / low - 1 / high) / (2 * np.pi)
     assert two_sided == pytest.approx(one_sided, rel=1e-14)
     assert "1.99 times the mean of ISO 8608 class C, one-sided" in road_of_level(0.7).label(0.7)
@@ -111,7 +111,7 @@ def test_isotropic_coherency_by_hand():
 @pytest.mark.grounds("closed form")
 def test_mean_and_roll_spectra_are_those_of_the_processes():
     left, right = np.random.default_rng(3).standard_normal((2, 400)).cumsum(axis=1)
-    found = spectra(MeasuredTracks(left, right, 0.1, 0.7, "walk"))
+    found = track_spectra(MeasuredTracks(left, right, 0.1, 0.7, "walk"))
     mean, roll = (left + right) / 2, (left - right) / 1.4
     size = 2 * round(np.pi / (found.wavenumber[0] * 0.1))  # the window that was taken, in stations
     for own, pair in ((found.mean, (mean, mean)), (found.roll, (roll, roll)), (found.mean_roll, (mean, roll))):
@@ -134,27 +134,32 @@ def test_what_a_road_cannot_tell_is_said():
     same = fit_road(MeasuredTracks(walk, walk, 0.1, 0.7, "same"))
     assert same.roll is None and same.road.roll.intensity == 0.0
     assert any("same heights" in note for note in same.notes)
-    assert not same.mean.resolved and any("corner of the mean process is not told" in note for note in same.notes)
+    assert not same.mean.corner_is_resolved and any(
+        "corner of the mean process is not told" in note for note in same.notes
+    )
     assert same.mean.filter.intensity == pytest.approx(1e-6 / 0.1, rel=0.3)  # steps of 1 mm every 0.1 m; 20 waves
 
 
 WRONG = {
-    "word": (lambda: excitation(ROAD, WHEELS, "modeled"), "did you mean 'modelled'"),
-    "order": (lambda: excitation(ROAD, (WHEELS[0], WheelPosition("r", 2.0, 0.7, 1))), "must not lie before axle 0"),
+    "word": (lambda: road_excitation(ROAD, WHEELS, "modeled"), "did you mean 'modelled'"),
+    "order": (
+        lambda: road_excitation(ROAD, (WHEELS[0], WheelPosition("r", 2.0, 0.7, 1))),
+        "must not lie before axle 0",
+    ),
     "one axle, two places": (
-        lambda: excitation(ROAD, (WHEELS[0], WheelPosition("r", 1.0, -0.7, 0))),
+        lambda: road_excitation(ROAD, (WHEELS[0], WheelPosition("r", 1.0, -0.7, 0))),
         "must stand at one x",
     ),
-    "gap": (lambda: excitation(ROAD, (WHEELS[0], WHEELS[4])), "must be numbered 0, 1"),
+    "gap": (lambda: road_excitation(ROAD, (WHEELS[0], WHEELS[4])), "must be numbered 0, 1"),
     "neither side": (
-        lambda: excitation(ROAD, (*WHEELS, WheelPosition("m", -2.7, 0.0, 2)), "uncorrelated"),
+        lambda: road_excitation(ROAD, (*WHEELS, WheelPosition("m", -2.7, 0.0, 2)), "uncorrelated"),
         "neither left",
     ),
     "cutoff": (lambda: ShapeFilter(0.3, 1e-5, 0.2), "above the corner"),
     "corner": (lambda: ShapeFilter(-0.3, 1e-5), "0 or more"),
     "track": (lambda: road_of_level(0.0), "half_track"),
     "waviness": (lambda: DensityPart(1e-5, 0.1, 1.0), "above 1"),
-    "short": (lambda: spectra(MeasuredTracks(np.zeros(30), np.zeros(30), 0.1, 0.7, "x")), "two windows or more"),
+    "short": (lambda: track_spectra(MeasuredTracks(np.zeros(30), np.zeros(30), 0.1, 0.7, "x")), "two windows or more"),
     "flat": (lambda: fit_road(MeasuredTracks(np.zeros(3000), np.zeros(3000), 0.1, 0.7, "x")), "there is no road"),
     "class": (lambda: level_of_class("I"), "class of ISO 8608"),
     "file": (lambda: read_tracks("road.txt"), "OpenCRG"),

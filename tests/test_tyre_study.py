@@ -5,7 +5,7 @@ import json
 import pytest
 
 from models.core.errors import InputError
-from models.systems.braking.of_scene import braked, table_of
+from models.systems.braking.of_scene import braked_vehicle, table_of
 from models.systems.braking.scene import build
 from models.tyre.tyre_file import tyre_table
 
@@ -38,7 +38,7 @@ def test_the_study_draws_a_tyre_and_writes_it_as_a_table_that_a_scene_takes(tmp_
 
 def test_rear_wheels_have_tyres_of_their_own_where_asked(tmp_path):
     scene = build({**SCENE, "tyres": {"own_rear": True}}, "s.toml", tmp_path)
-    vehicle = braked(scene, scene.procedures["straight"])
+    vehicle = braked_vehicle(scene, scene.procedures["straight"])
     assert vehicle.kind.tolist() == [0, 0, 1, 1] and vehicle.road.kinds == 2
     assert vehicle.tables.mu_x.max(axis=(1, 2, 3)) == pytest.approx([0.172, 0.173], abs=1e-4)
 

@@ -5,17 +5,24 @@ import pytest
 
 from models.core.errors import InputError
 from models.tyre.magic_formula import (
+    NAMED_SURFACES,
     PACEJKA,
-    SURFACES,
     Burckhardt,
     MagicFormulaCurve,
     by_similarity,
-    factors,
-    graded,
-    surface,
+    graded_nodes,
+    product_factors,
+    table_of_surface,
 )
-from models.tyre.tyre_source import named
-from models.tyre.tyre_table import Cells, TyreTable, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
+from models.tyre.tyre_source import named_tyre
+from models.tyre.tyre_table import (
+    TableCell,
+    TyreTable,
+    cell_and_share,
+    lateral_adhesion,
+    longitudinal_adhesion,
+    stacked_tables,
+)
 
 
 def small(peak=0.8):
@@ -38,7 +45,7 @@ def small(peak=0.8):
 
 def at(tables, number, angle, load, slip):
     """mu_x and mu_y by the compiled functions."""
-    cells = Cells(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load))
+    cells = TableCell(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load))
     k, w = cell_and_share(tables.slips, slip)
     mu = [longitudinal_adhesion(number, cells, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
     return (1 - w) * mu[0] + w * mu[1], lateral_adhesion(number, cells, k, w, tables.g, tables.h)
@@ -47,7 +54,7 @@ def at(tables, number, angle, load, slip):
 @pytest.mark.grounds("closed form")
 def test_exact_at_nodes_linear_between_constant_beyond():
     table = small()
-    tables = stacked([table])
+    tables = stacked_tables([table])
     for i, angle in enumerate(table.angles):
         for j, load in enumerate(table.loads):
             for k, slip in enumerate(table.slips):
@@ -61,22 +68,22 @@ def test_exact_at_nodes_linear_between_constant_beyond():
 
 
 def test_the_union_of_nodes_loses_nothing():
-    ice, nodes = SURFACES["ice"], (np.array([1e4]), np.array([0, 0.03, 0.25]), np.array([0, 0.15, 1.0]))
+    ice, nodes = NAMED_SURFACES["ice"], (np.array([1e4]), np.array([0, 0.03, 0.25]), np.array([0, 0.15, 1.0]))
     one, other = small(), by_similarity(lambda k, _: ice[0](k), lambda k, _: ice[1](k), *nodes)
-    both = stacked([one, other])
+    both = stacked_tables([one, other])
     rng = np.random.default_rng(5)
     for angle, load, slip in rng.uniform((0, 5e3, 0), (0.5, 4e4, 1), (60, 3)):
         for number, table in enumerate((one, other)):
             # g and h lie between nodes of the union as between their own: equal to rounding
             assert at(both, number, angle, load, slip) == pytest.approx(
-                at(stacked([table]), 0, angle, load, slip), rel=1e-13, abs=1e-15
+                at(stacked_tables([table]), 0, angle, load, slip), rel=1e-13, abs=1e-15
             )
             x, y = table.friction([angle], [slip], load)
             assert (x[0, 0], y[0, 0]) == pytest.approx(at(both, number, angle, load, slip), rel=1e-13, abs=1e-15)
 
 
 def test_slopes_are_those_of_the_cell():
-    tables = stacked([small()])
+    tables = stacked_tables([small()])
     for low, high in ((0.0, 0.2), (0.2, 1.0)):
         ends = [at(tables, 0, 0.05, 1.5e4, slip)[0] for slip in (low, high)]
         inner = [at(tables, 0, 0.05, 1.5e4, low + share * (high - low))[0] for share in (0.1, 0.9)]
@@ -97,7 +104,7 @@ def test_both_formulas_as_their_books_write_them():
 
 @pytest.mark.grounds("closed form")
 def test_nodes_grow_as_a_geometric_series():
-    nodes = graded(2.0, 0.05, 31)
+    nodes = graded_nodes(2.0, 0.05, 31)
     assert nodes + 0.05 == pytest.approx(0.05 * 41.0 ** (np.arange(31) / 30.0), rel=1e-13)
 
 
@@ -105,7 +112,7 @@ def test_nodes_grow_as_a_geometric_series():
 def test_friction_across_as_a_product_by_least_squares():
     """g is the slope of the best line through the origin, over the loads, of mu_y by h; h is mu_y without slip."""
     mu = np.random.default_rng(4).uniform(0.1, 1.0, (3, 4, 5))
-    g, h = factors(mu)
+    g, h = product_factors(mu)
     assert np.array_equal(h, mu[:, :, 0]) and np.array_equal(g[0], g[1])
     for a in (1, 2):
         best = [np.linalg.lstsq(mu[a, :, :1], mu[a, :, k], rcond=None)[0][0] for k in range(5)]
@@ -117,7 +124,7 @@ def test_towards_no_angle_a_table_has_the_slope_of_its_formula():
     """Across the wheel friction begins with the slope B C D; with a slip k it is mu(k) / k by it, to the angle's first
     order."""
     for name in ("dry", "ice/rear"):
-        across, table = PACEJKA[name][1], surface(name)
+        across, table = PACEJKA[name][1], table_of_surface(name)
         steepest = across.B * across.C * across.D
         assert table.cornering == pytest.approx(steepest, rel=2e-3)  # a secant over the first cell of angles
         assert table.g[0, 1:] == pytest.approx(across(table.slips[1:]) / table.slips[1:] / steepest, rel=1e-6)
@@ -139,7 +146,7 @@ def between(table, exact):
 @pytest.mark.parametrize("name", PACEJKA)
 @pytest.mark.grounds("closed form")
 def test_magic_formulas_are_met_between_nodes_and_never_above_their_peak(name):
-    table, curves = surface(name), PACEJKA[name]
+    table, curves = table_of_surface(name), PACEJKA[name]
     off_x, off_y, most = between(table, curves)
     assert off_x < 1e-4 and off_y < 1e-4  # of mu: what the nodes promise
     assert most <= max(curve.D for curve in curves)
@@ -148,16 +155,16 @@ def test_magic_formulas_are_met_between_nodes_and_never_above_their_peak(name):
 
 @pytest.mark.grounds("closed form")
 def test_one_curve_for_both_directions_is_not_above_its_peak():
-    table = surface("dry asphalt")
+    table = table_of_surface("dry asphalt")
     # nodes are capped at the peak; between them g times h bulges by 4e-6 of it
-    assert between(table, SURFACES["dry asphalt"])[2] <= table.mu_x.max() * (1 + 1e-5)
+    assert between(table, NAMED_SURFACES["dry asphalt"])[2] <= table.mu_x.max() * (1 + 1e-5)
     x = table.friction([0.0], [0.17], 1e4)[0][0, 0]
     assert x == pytest.approx(1.2801 * (1 - np.exp(-23.99 * 0.17)) - 0.52 * 0.17, abs=1e-4)
 
 
 @pytest.mark.grounds("closed form")
 def test_friction_falls_with_the_load_as_asked():
-    table = surface("dry", load=2e4, fall=0.1)
+    table = table_of_surface("dry", load=2e4, fall=0.1)
     slips, angles = np.array([0.12]), np.array([0.1])
     x, y = (np.array([table.friction(angles, slips, load)[i][0, 0] for load in (5e3, 2e4, 3e4, 4e4)]) for i in (0, 1))
     assert x / x[1] == pytest.approx([1.075, 1.0, 0.95, 0.9], rel=1e-12)
@@ -168,12 +175,12 @@ def test_friction_falls_with_the_load_as_asked():
 
 @pytest.mark.grounds("closed form")
 def test_front_and_rear_differ():
-    assert named("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
-    assert named("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and named("ice").h.max() == pytest.approx(
+    assert named_tyre("dry", rear=True).h.max() == pytest.approx(0.961, abs=1e-4)
+    assert named_tyre("dry").mu_x.max() == pytest.approx(1.20, abs=1e-4) and named_tyre("ice").h.max() == pytest.approx(
         0.162, abs=1e-4
     )
-    assert surface("dry").h.max() == pytest.approx(0.935, abs=1e-4)
-    assert surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
+    assert table_of_surface("dry").h.max() == pytest.approx(0.935, abs=1e-4)
+    assert table_of_surface("dry/rear").h.max() == pytest.approx(0.961, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -198,6 +205,6 @@ def test_what_no_tyre_can_have_is_told(change, said):
 
 def test_a_surface_that_is_none_is_told():
     with pytest.raises(InputError, match="did you mean 'snow'"):
-        surface("snw")
+        table_of_surface("snw")
     with pytest.raises(InputError, match="fall = 1"):
-        surface("dry", fall=1.0)
+        table_of_surface("dry", fall=1.0)

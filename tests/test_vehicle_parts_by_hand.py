@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.noise import GYRO_BIAS, normal
+from models.core.noise import GYRO_BIAS, normal_samples
 from models.core.systems import of_table
 from models.engines.stability import first_order, growth
 from models.multibody.numbers import Handling, Tyres
-from models.sensors.inertial_unit import bias
+from models.sensors.inertial_unit import bias_path
 from models.systems.braking.of_scene import controller_of
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.sampling import within_range
@@ -106,17 +106,17 @@ def test_an_oscillator_grows_in_steps_of_euler_by_their_known_factor():
 
 def test_a_bias_starts_from_its_draw_and_forgets_by_its_time():
     """b = turn_on n0 + s x, x(0) = n1, x(k + 1) = f x(k) + sqrt(1 - f^2) n(k + 2), f = exp(-period / tau)."""
-    draws = normal(3, 1, 6, 1, source=GYRO_BIAS)[:, 0]
+    draws = normal_samples(3, 1, 6, 1, source=GYRO_BIAS)[:, 0]
     factor, state, wanted = math.exp(-0.25), draws[1], []
     for k in range(5):
         wanted.append(0.3 * draws[0] + 0.2 * state)
         state = factor * state + math.sqrt(1.0 - factor**2) * (draws[k + 2] if k < 4 else 0.0)
-    assert bias(5, 0.5, 0.3, 0.2, 2.0, 3, 1) == pytest.approx(wanted, rel=1e-12)
+    assert bias_path(5, 0.5, 0.3, 0.2, 2.0, 3, 1) == pytest.approx(wanted, rel=1e-12)
 
 
 def test_the_range_of_a_sensor_has_two_ends():
     assumed = within_range("gyro", {"gyro": "gyro"}, "rad/s", 2.5)
-    assert (assumed.least, assumed.most) == (-2.5, 2.5)
+    assert (assumed.lower_limit, assumed.upper_limit) == (-2.5, 2.5)
 
 
 def test_a_scene_s_controller_has_its_parameters():

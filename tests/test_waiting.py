@@ -10,23 +10,23 @@ from pathlib import Path
 
 import pytest
 
-from models.core.waiting import MARCHES, marching
+from models.core.waiting import SHARES_OF_MARCHES, marching
 from models.engines.assembly import Settings
 from models.engines.protocol import build
-from models.systems.pitch_plane.scene import assemble
-from studies.command.waiting import COMPILING, Waiting
+from models.systems.pitch_plane.scene import assembly_of_scene
+from studies.command.waiting import COMPILE_SECONDS, Waiting
 from validation.common.scenes import road_scene
 
 ROOT = Path(__file__).parents[1]
 WORK = """
 import os, sys, time
 from models.core.waiting import marching
-from studies.command.waiting import waiting
+from studies.command.waiting import progress_bar
 begun = time.monotonic()
 def until(seen):
     while not os.path.exists(seen) and time.monotonic() - begun < {0}:
         time.sleep(0.05)
-with waiting("road: exudyn", "handling") as tell:
+with progress_bar("road: exudyn", "handling") as tell:
     tell("road: exudyn", 0.0)
     with marching(lambda: min(0.9, (time.monotonic() - begun) / {0})):
         until("march")
@@ -78,7 +78,7 @@ def test_a_bar_tells_the_work_the_time_left_and_compiling(tmp_path):
 
 
 def test_nothing_is_drawn_of_short_work_and_into_pipes(tmp_path):
-    short = "from studies.command.waiting import waiting\nwith waiting('road', ''): pass\nprint('done')"
+    short = "from studies.command.waiting import progress_bar\nwith progress_bar('road', ''): pass\nprint('done')"
     drawn, written = on_terminal(sys.executable, "-c", short, folder=tmp_path)
     assert drawn == "" and written == "done\n"
     plain = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -118,32 +118,32 @@ def test_a_march_tells_how_far_it_is(engine, monkeypatch):
             ends.append(share())
             super().remove(share)
 
-    monkeypatch.setattr("models.core.waiting.MARCHES", Told())
+    monkeypatch.setattr("models.core.waiting.SHARES_OF_MARCHES", Told())
     scene = road_scene(duration=0.5)
-    build(engine, assemble(scene), Settings({"exudyn": "RK44", "mujoco": "RK4"}[engine], 1e-3, 0.5)).run()
+    build(engine, assembly_of_scene(scene), Settings({"exudyn": "RK44", "mujoco": "RK4"}[engine], 1e-3, 0.5)).run()
     assert ends == [pytest.approx(1.0, abs=1e-9)]
 
 
 def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    shown = Waiting("six runs", "pitch-plane", begun=now[0])
+    shown = Waiting("six runs", "pitch-plane", start_time=now[0])
     shown.tell("six runs", 0.25)
     now[0] += 10.0
     assert shown.state() == ("six runs", 0.25, "30 s left")
-    shown.kernels._start()
+    shown.compilations._start()
     now[0] += 2.0
     text, share, left = shown.state()
-    assert text == "compiling kernels, once" and left == f"{COMPILING['pitch-plane'] - 2.0:.0f} s left"
-    assert share == pytest.approx(2.0 / COMPILING["pitch-plane"])
-    now[0] += 2.0 * COMPILING["pitch-plane"]
-    assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILING['pitch-plane']:.0f} s so far")
-    shown.kernels._end_compilation()
+    assert text == "compiling kernels, once" and left == f"{COMPILE_SECONDS['pitch-plane'] - 2.0:.0f} s left"
+    assert share == pytest.approx(2.0 / COMPILE_SECONDS["pitch-plane"])
+    now[0] += 2.0 * COMPILE_SECONDS["pitch-plane"]
+    assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILE_SECONDS['pitch-plane']:.0f} s so far")
+    shown.compilations._end_compilation()
     assert shown.state() == ("six runs", 0.25, "30 s left")
     with marching(lambda: 0.5):
         shown.state()
         now[0] += 8.0
         assert shown.state() == ("six runs", 0.5, "8 s left")
-    assert not MARCHES
+    assert not SHARES_OF_MARCHES
     with marching(lambda: 1 / 0):
         assert shown.state()[1] == 0.0

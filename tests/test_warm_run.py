@@ -82,8 +82,8 @@ def test_units_are_read_where_a_run_left_their_library_out():
 import json
 from models.machine.left_out import leave_out
 leave_out("pint")
-from models.measured.units import conversion
-print(json.dumps(conversion("kN", "force", "", "")))
+from models.measured.units import factor_to_si
+print(json.dumps(factor_to_si("kN", "force", "", "")))
 """
     assert last_line(code, ROOT) == 1000.0
 
@@ -101,8 +101,8 @@ def coefficients(tmp_path_factory):
 import json, os
 from numba import njit
 from models.contact import linear_theory
-from models.rail.wheel_forces import _linear
-linear = njit(lambda a, b, motion, shear, poisson: _linear(a, b, motion, shear, poisson))
+from models.rail.wheel_forces import _linear_forces
+linear = njit(lambda a, b, motion, shear, poisson: _linear_forces(a, b, motion, shear, poisson))
 linear(5e-3, 4e-3, (1e-4, 1e-4, 0.1), 8e10, 0.28)
 names = ("coefficient_at", "_tabulated", "_narrow_limit", "_long_limit")
 print(json.dumps({name: len(getattr(linear_theory, name).signatures) for name in names}))

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 
 from models.core.errors import InputError
-from models.ride.covariance import stationary
+from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem
-from models.ride.weighting import HEALTH, WEIGHTINGS, total_value, weighted
+from models.ride.weighting import HEALTH_FACTORS, WEIGHTINGS, system_with_weightings, total_value
 
 DELAY = 0.13
 
@@ -34,7 +34,7 @@ def by_quadrature(name: str, pole: float) -> float:
 @pytest.mark.grounds("closed form")
 @pytest.mark.parametrize("name", ["Wk", "Wd"])
 def test_white_noise_through_a_weighting_has_a_variance_and_the_right_one(name):
-    found = stationary(weighted(two_hits(), {"a": name, "b": "We"}))
+    found = stationary_covariance(system_with_weightings(two_hits(), {"a": name, "b": "We"}))
     assert found.names == ("a", "b", f"a {name}", "b We")
     assert found.status == ("infinite", "finite", "finite", "finite")
     assert found.variance[2] == pytest.approx(by_quadrature(name, 0.0), rel=1e-8)
@@ -42,12 +42,14 @@ def test_white_noise_through_a_weighting_has_a_variance_and_the_right_one(name):
 
 
 def test_what_was_there_stays_as_it_was():
-    before, after = two_hits(), weighted(two_hits(), {"b": "Wk"})
+    before, after = two_hits(), system_with_weightings(two_hits(), {"b": "Wk"})
     assert after.delays == before.delays and not after.independent
     assert (after.C[:2, :1] == before.C).all() and not after.C[:2, 1:].any()
     assert all((a[:2] == b).all() and not a[2:].any() for a, b in zip(after.D, before.D, strict=True))
-    assert stationary(after).variance[1] == pytest.approx(stationary(before).variance[1], rel=1e-13)  # rounding
-    assert weighted(before, {}) is before
+    assert stationary_covariance(after).variance[1] == pytest.approx(
+        stationary_covariance(before).variance[1], rel=1e-13
+    )  # rounding
+    assert system_with_weightings(before, {}) is before
 
 
 @pytest.mark.grounds("closed form")
@@ -62,10 +64,10 @@ def test_band_limits_and_plateaus():
 @pytest.mark.grounds("closed form")
 def test_total_value_counts_the_axes():
     assert total_value({"x": 3.0, "y": 0.0, "z": 4.0}, {"x": 1, "y": 1, "z": 1}) == 5.0
-    assert total_value({"x": 1.0, "y": 1.0}, HEALTH) == pytest.approx(1.4 * 2**0.5)
+    assert total_value({"x": 1.0, "y": 1.0}, HEALTH_FACTORS) == pytest.approx(1.4 * 2**0.5)
 
 
 @pytest.mark.parametrize(("filters", "said"), [({"c": "Wk"}, "must be an output"), ({"a": "wk"}, "did you mean 'Wk'")])
 def test_wrong_weightings_are_refused_in_words(filters, said):
     with pytest.raises(InputError, match=said):
-        weighted(two_hits(), filters)
+        system_with_weightings(two_hits(), filters)

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 from validation.replay.jobs import SHORT_RUN_SETTINGS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("models", "studies", "validation", "twinrig")
 LESS = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
-NAMES = sorted(path.stem for path in SCENES.glob("*.toml"))
+NAMES = sorted(path.stem for path in SCENES_FOLDER.glob("*.toml"))
 
 pytestmark = pytest.mark.full
 

@@ -11,19 +11,26 @@ from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.contact_table import rolling_radius_difference
-from models.rail.eigenvalues import growth as of_all
+from models.rail.eigenvalues import largest_growth as of_all
 from models.rail.equations import Equations
 from models.rail.equivalent_conicity import harmonic_linearised_conicity
-from models.rail.limit_cycle import attained, refined
-from models.rail.linear import critical_speed, gravity, growth, kinematic_wavelength, klingel, matrices
+from models.rail.limit_cycle import attained_cycle, refined_orbit
+from models.rail.linear import (
+    critical_speed,
+    gravity,
+    kinematic_wavelength,
+    klingel_wavelength,
+    largest_growth,
+    linear_matrices,
+)
 from models.rail.profile_contact import Pose
 from models.rail.wheel_forces import REPORT
-from models.rail.wheelset import CHOSEN
-from validation.contact.manchester_references import CONTACT, contact_of, placed_at, sums
+from models.rail.wheelset import CHOSEN_WHEELSET
+from validation.contact.manchester_references import CONTACT, contact_of, patch_sums, placed_at
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
-FREE = CHOSEN.changed(**SPRINGS)
-CONE = Cone(CHOSEN.radius, CHOSEN.half_gauge, CHOSEN.conicity, CHOSEN.head_radius)
+FREE = CHOSEN_WHEELSET.changed(**SPRINGS)
+CONE = Cone(CHOSEN_WHEELSET.radius, CHOSEN_WHEELSET.half_gauge, CHOSEN_WHEELSET.conicity, CHOSEN_WHEELSET.head_radius)
 POSE = Pose(0.006, 1e-4, -0.004, 0.03)
 
 
@@ -65,36 +72,36 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
 @pytest.mark.grounds("closed form")
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
-    pose = (y, 0.0, -CHOSEN.tilt * y, 0.0)
+    pose = (y, 0.0, -CHOSEN_WHEELSET.tilt * y, 0.0)
     right, left = (cone_on_rail(side, Pose(*pose), CONE) for side in (RIGHT, LEFT))
     assert (right[0], left[0]) == pytest.approx((0.0, 0.0), abs=3e-11)  # second order: tilt y^2 = 7e-12
-    assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN.equivalent_conicity, rel=1e-6)
-    assert CHOSEN.coned(0.2).equivalent_conicity == pytest.approx(0.2, rel=1e-9)
+    assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN_WHEELSET.equivalent_conicity, rel=1e-6)
+    assert CHOSEN_WHEELSET.coned(0.2).equivalent_conicity == pytest.approx(0.2, rel=1e-9)
 
 
 @pytest.mark.grounds("closed form")
 def test_klingels_wave():
     # Spin creepage and its lateral force leave 1e-5 of it.
-    assert kinematic_wavelength(CHOSEN) == pytest.approx(klingel(CHOSEN), rel=3e-5)
-    edges = CHOSEN.changed(head_radius=0.01)
-    klingels = 2 * math.pi * math.sqrt(CHOSEN.radius * CHOSEN.half_gauge / CHOSEN.conicity)
-    assert klingel(edges) == pytest.approx(klingels, rel=1e-3)
+    assert kinematic_wavelength(CHOSEN_WHEELSET) == pytest.approx(klingel_wavelength(CHOSEN_WHEELSET), rel=3e-5)
+    edges = CHOSEN_WHEELSET.changed(head_radius=0.01)
+    klingels = 2 * math.pi * math.sqrt(CHOSEN_WHEELSET.radius * CHOSEN_WHEELSET.half_gauge / CHOSEN_WHEELSET.conicity)
+    assert klingel_wavelength(edges) == pytest.approx(klingels, rel=1e-3)
     # All five motions, slow and free: the closed form within the 1e-3 asked for; 2.5e-5 seen.
     values = np.linalg.eigvals(Equations(FREE, 0.2, "linear").state_matrix)
     slow = min(values[values.imag > 0], key=abs)
-    assert 2 * math.pi * 0.2 / slow.imag == pytest.approx(klingel(FREE), rel=1e-4)
+    assert 2 * math.pi * 0.2 / slow.imag == pytest.approx(klingel_wavelength(FREE), rel=1e-4)
 
 
 @pytest.mark.grounds("plain counterpart")
 def test_critical_speed():
-    speed = critical_speed(CHOSEN)
-    assert abs(growth(CHOSEN, speed)) < 1e-9
-    assert growth(CHOSEN, speed * 1.001) > 0.0 > growth(CHOSEN, speed * 0.999)
+    speed = critical_speed(CHOSEN_WHEELSET)
+    assert abs(largest_growth(CHOSEN_WHEELSET, speed)) < 1e-9
+    assert largest_growth(CHOSEN_WHEELSET, speed * 1.001) > 0.0 > largest_growth(CHOSEN_WHEELSET, speed * 0.999)
     # The equations with linear creep have what the two motions leave out: 0.4 % less.
-    assert critical_speed(CHOSEN, partial(of_all, Equations)) == pytest.approx(speed, rel=6e-3)
-    assert critical_speed(CHOSEN.changed(stiffness_x=8e5)) > speed
+    assert critical_speed(CHOSEN_WHEELSET, partial(of_all, Equations)) == pytest.approx(speed, rel=6e-3)
+    assert critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=8e5)) > speed
     with pytest.raises(InputError, match="stable up to"):
-        critical_speed(CHOSEN.changed(stiffness_x=1e9, stiffness_y=1e9))
+        critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=1e9, stiffness_y=1e9))
 
 
 @pytest.mark.grounds("closed form")
@@ -105,32 +112,34 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
         z = roll = 0.0
         for _ in range(20):
             right, left = (cone_on_rail(side, Pose(y, z, roll, yaw), CONE)[0] for side in (RIGHT, LEFT))
-            z, roll = z - (right + left) / 2, roll - (right - left) / (2 * CHOSEN.half_gauge)
+            z, roll = z - (right + left) / 2, roll - (right - left) / (2 * CHOSEN_WHEELSET.half_gauge)
         return z
 
     h = 2e-3
-    measured = [-CHOSEN.load * (fall(h * (k == 0), h * (k == 1)) * 2 - 2 * fall(0, 0)) / h**2 for k in (0, 1)]
-    heavier = matrices(FREE.changed(load=2 * FREE.load), 10.0).stiffness
-    assert np.diag(gravity(CHOSEN)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
+    measured = [-CHOSEN_WHEELSET.load * (fall(h * (k == 0), h * (k == 1)) * 2 - 2 * fall(0, 0)) / h**2 for k in (0, 1)]
+    heavier = linear_matrices(FREE.changed(load=2 * FREE.load), 10.0).stiffness
+    assert np.diag(gravity(CHOSEN_WHEELSET)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
     assert heavier[0, 0] == pytest.approx(2 * measured[0], rel=1e-4)  # creep forces do not follow y in the first row
 
 
 @pytest.mark.grounds("closed form")
 def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
-    equations = Equations(CHOSEN, 50.0)
+    equations = Equations(CHOSEN_WHEELSET, 50.0)
     path = equations.run(equations.rest, 0.01, 5e-4)
     assert np.abs(equations.rates(equations.rest)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE]]).max() < 1e-9
     contact = path.contacts[0]
     upward = contact["load"] * np.cos(contact["angle"]) - contact["fy"] * np.sin(contact["angle"])
-    assert upward.sum() == pytest.approx(CHOSEN.load, rel=1e-5)  # the springs bear what the spin's forces lift
-    assert contact["a"][0] == pytest.approx(float(CHOSEN.ellipse.a), rel=1e-3)  # 0.2 % of the load is that of spin
+    assert upward.sum() == pytest.approx(CHOSEN_WHEELSET.load, rel=1e-5)  # the springs bear what the spin's forces lift
+    assert contact["a"][0] == pytest.approx(
+        float(CHOSEN_WHEELSET.ellipse.a), rel=1e-3
+    )  # 0.2 % of the load is that of spin
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
 @pytest.mark.grounds("closed form")
 def test_energy_is_what_the_forces_do(law):
     """d(T + U)/dt by the energies' own expressions against the power of the contacts, at a lively state."""
-    w = CHOSEN.changed(damping_x=0.0, damping_y=0.0, damping_z=0.0, flange_clearance=0.02)
+    w = CHOSEN_WHEELSET.changed(damping_x=0.0, damping_y=0.0, damping_z=0.0, flange_clearance=0.02)
     equations = Equations(w, 40.0, law)
     body = equations.body
     state = np.array([0.006, 9e-5, -0.0004, 0.02, 0.0, 0.3, 0.02, 1.0, -20.0, -90.0])
@@ -161,15 +170,15 @@ def test_energy_is_what_the_forces_do(law):
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
 def test_contacts_that_are_not_known_yet_are_no_numbers(shape):
-    contacts = Equations(CHOSEN, 50.0).blank(*shape)
+    contacts = Equations(CHOSEN_WHEELSET, 50.0).empty_contacts(*shape)
     assert contacts.dtype == REPORT and contacts.shape == (*shape, 2)
     assert all(np.isnan(contacts[name]).all() for name in REPORT.names)
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
 def test_backwards_is_the_mirror_image(law):
-    forwards, backwards = Equations(CHOSEN, 60.0, law, 11), Equations(CHOSEN, -60.0, law, 11)
-    start, mirrored = forwards.displaced(5e-3), backwards.displaced(5e-3)
+    forwards, backwards = Equations(CHOSEN_WHEELSET, 60.0, law, 11), Equations(CHOSEN_WHEELSET, -60.0, law, 11)
+    start, mirrored = forwards.displaced_state(5e-3), backwards.displaced_state(5e-3)
     one, two = forwards.run(start, 0.1, 5e-4).states, backwards.run(mirrored, 0.1, 5e-4).states
     assert one[:, eq.Y] == pytest.approx(two[:, eq.Y], abs=1e-14)
     assert one[:, eq.YAW] == pytest.approx(-two[:, eq.YAW], abs=1e-14)
@@ -177,15 +186,15 @@ def test_backwards_is_the_mirror_image(law):
 
 
 def test_order_of_the_march():
-    equations = Equations(CHOSEN, 60.0, "linear")
-    start = equations.displaced(5e-3)
+    equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
+    start = equations.displaced_state(5e-3)
     ends = [equations.run(start, 0.1, h).states[-1] for h in (5e-4, 2.5e-4, 1.25e-4)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
     assert math.log2(first / second) > 3.8
 
 
 def test_wheel_that_lifts_off_has_no_forces_and_comes_back():
-    equations = Equations(CHOSEN, 40.0, cells=11)
+    equations = Equations(CHOSEN_WHEELSET, 40.0, cells=11)
     start = equations.rest.copy()
     start[eq.Z] -= 2e-4
     path = equations.run(start, 0.3, 2e-4)
@@ -197,31 +206,31 @@ def test_wheel_that_lifts_off_has_no_forces_and_comes_back():
 
 
 def test_limit_cycle_above_the_critical_speed():
-    above = refined(attained(Equations(CHOSEN, 75.0, cells=11)), "amplitude")
+    above = refined_orbit(attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=11)), "amplitude")
     assert above.stable and above.multiplier < 0.1
-    assert CHOSEN.flange_clearance < above.amplitude < CHOSEN.flange_clearance + 1.5e-3
+    assert CHOSEN_WHEELSET.flange_clearance < above.amplitude < CHOSEN_WHEELSET.flange_clearance + 1.5e-3
     # Creep forces that saturate and a flange make the wave a little shorter or longer than Klingel's: 3 % here.
-    assert above.frequency == pytest.approx(75.0 / klingel(CHOSEN), rel=0.05)
+    assert above.frequency == pytest.approx(75.0 / klingel_wavelength(CHOSEN_WHEELSET), rel=0.05)
     assert above.error < 1e-5 * above.amplitude  # 1e-6 seen; asked for 1e-2
     assert above.frequency_error < 1e-5 * above.frequency
     # The motion itself, marched in other steps, comes back to the orbit.
-    tops = above.equations.run(above.equations.displaced(6e-3), 6.0, 4e-4).states[:, eq.Y]
+    tops = above.equations.run(above.equations.displaced_state(6e-3), 6.0, 4e-4).states[:, eq.Y]
     assert tops[-1000:].max() == pytest.approx(above.amplitude, rel=1e-4)  # of maxima that fall between two steps
-    assert attained(Equations(CHOSEN, 45.0, cells=11)) is None
+    assert attained_cycle(Equations(CHOSEN_WHEELSET, 45.0, cells=11)) is None
 
 
 def test_what_cannot_be_is_refused():
-    equations = Equations(CHOSEN, 50.0, cells=11)
+    equations = Equations(CHOSEN_WHEELSET, 50.0, cells=11)
     with pytest.raises(InputError, match="at most"):
         equations.run(equations.rest, 1.0, 5e-3)
     with pytest.raises(InputError, match="did you mean"):
-        Equations(CHOSEN, 50.0, "fastsimm")
+        Equations(CHOSEN_WHEELSET, 50.0, "fastsimm")
     with pytest.raises(InputError, match="speed"):
-        Equations(CHOSEN, 200.1)
+        Equations(CHOSEN_WHEELSET, 200.1)
     with pytest.raises(InputError, match="own weight"):
-        CHOSEN.changed(load=1000.0)
+        CHOSEN_WHEELSET.changed(load=1000.0)
     with pytest.raises(InputError, match="conicity"):
-        CHOSEN.changed(conicity=0.0)
+        CHOSEN_WHEELSET.changed(conicity=0.0)
     start = equations.rest.copy()
     start[eq.YAW_RATE] = 50.0
     with pytest.raises(RunFailed, match="leaves the track"):
@@ -243,7 +252,7 @@ def against_contact(rows):
     found = [placed_at("A-2", float(shift)) for shift in rows[:, 0] * 1e-3]
     for (_, _, *right_left), one in zip(rows, found, strict=True):
         for wheel, (y, normal, peak) in (("right", right_left[:3]), ("left", right_left[3:])):
-            own = sums(one, wheel)
+            own = patch_sums(one, wheel)
             assert own[0] == pytest.approx(y, abs=0.3)
             assert own[1] == pytest.approx(normal, rel=0.02)  # 0.5 % seen
             assert own[2] == pytest.approx(peak, rel=0.04)  # cells of 0.2 mm there

@@ -7,7 +7,7 @@ from models.rail import equations as eq
 from models.rail.equations import Equations
 from models.rail.joint_forces import JOINTS, set_joint_forces, table, to_joints
 from models.rail.laid_profiles import Profiles
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.wheelset.plain_wheelset import PlainWheelset
 
 pytestmark = pytest.mark.grounds("plain counterpart")
@@ -25,7 +25,7 @@ def states(wheelset, speed, count, seed=11):
     return random
 
 
-def both(speed, law, lean=0.0, wheelset=CHOSEN):
+def both(speed, law, lean=0.0, wheelset=CHOSEN_WHEELSET):
     return Equations(wheelset, speed, law, CELLS, lean), PlainWheelset(wheelset, speed, law, CELLS, lean)
 
 
@@ -41,7 +41,7 @@ def both(speed, law, lean=0.0, wheelset=CHOSEN):
 )
 def test_rates_and_contacts_are_those_of_plain_vectors(speed, law, lean):
     compiled, plain = both(speed, law, lean)
-    drawn = states(CHOSEN, speed, 12)
+    drawn = states(CHOSEN_WHEELSET, speed, 12)
     rates, contacts = compiled.at(drawn)
     expected = np.array([plain.rates(state) for state in drawn])
     # the penetration is a difference of metres: 1e-16 m of 1e-4 m, to the power 3/2; FASTSIM has its corners
@@ -56,7 +56,7 @@ def test_rates_and_contacts_are_those_of_plain_vectors(speed, law, lean):
 def test_joint_forces_of_the_engines_are_the_rails_by_virtual_work():
     compiled, plain = both(25.0, "fastsim")
     numbers = table(25.0, compiled.rails)
-    for state in states(CHOSEN, 25.0, 6):
+    for state in states(CHOSEN_WHEELSET, 25.0, 6):
         block = np.concatenate((np.full(JOINTS, 7.0), to_joints(state), numbers))
         set_joint_forces(block.ctypes.data, 0.0, JOINTS)
         expected = plain.on_joints(state)
@@ -65,15 +65,15 @@ def test_joint_forces_of_the_engines_are_the_rails_by_virtual_work():
 
 def test_a_march_is_the_classical_runge_kutta_method_of_the_plain_rates():
     compiled, plain = both(40.0, "linear")
-    start = compiled.displaced(4e-3)
+    start = compiled.displaced_state(4e-3)
     path = compiled.run(start, 0.012, 4e-4, 3).states
     assert path == pytest.approx(plain.run(start, 4e-4, 30)[::3], abs=1e-11)
 
 
 def test_profiles_carry_the_load_at_the_height_where_the_springs_bear_no_more():
     """In the middle of the track, without rates: the vertical parts of the normal forces are the load."""
-    compiled = Equations(CHOSEN.changed(profiles=Profiles()), 40.0, "linear")
-    state = np.zeros(eq.STATES)
-    state[eq.Z], state[eq.SPIN] = compiled.body.sunk, -40.0 / CHOSEN.radius
+    compiled = Equations(CHOSEN_WHEELSET.changed(profiles=Profiles()), 40.0, "linear")
+    state = np.zeros(eq.STATE_COUNT)
+    state[eq.Z], state[eq.SPIN] = compiled.body.sunk, -40.0 / CHOSEN_WHEELSET.radius
     contacts = compiled.at(state[None])[1][0]
-    assert contacts["load"] @ np.cos(contacts["angle"]) == pytest.approx(CHOSEN.load, rel=1e-9)
+    assert contacts["load"] @ np.cos(contacts["angle"]) == pytest.approx(CHOSEN_WHEELSET.load, rel=1e-9)

@@ -9,16 +9,16 @@ from models.core.errors import InputError
 from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.energy import ledger
+from models.rail.energy import energy_ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
-from models.rail.linear import klingel
-from models.rail.profile_contact import TOUCH, Pose, pressed
+from models.rail.linear import klingel_wavelength
+from models.rail.profile_contact import TOUCH, Pose, normal_force_and_axes
 from models.rail.profile_statics import equilibrium, steering_cones
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.contact.manchester_references import SCENE, placed_at
 
-ON_PROFILES = CHOSEN.changed(profiles=Profiles())
+ON_PROFILES = CHOSEN_WHEELSET.changed(profiles=Profiles())
 FREE = ON_PROFILES.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 LIVELY = np.array([4e-3, 4e-5, 1e-4, 3e-3, 3.0, 0.05, 0.02, 0.05, 0.05, 0.5])
 FLANGE = math.radians(-45.0)
@@ -71,7 +71,7 @@ def test_lateral_force_is_the_slope_of_the_energy():
 def test_mirror():
     equations, draw = Equations(ON_PROFILES, 50.0), np.random.default_rng(3)
     mirror = np.array([-1, 1, -1, -1, 1, -1, 1, -1, -1, 1])
-    for state in equations.rest + LIVELY * draw.normal(size=(20, eq.STATES)):
+    for state in equations.rest + LIVELY * draw.normal(size=(20, eq.STATE_COUNT)):
         one, two = equations.rates(state), mirror * equations.rates(mirror * state)
         assert np.abs(one - two).max() <= 1e-13 * np.abs(one).max()
 
@@ -79,9 +79,9 @@ def test_mirror():
 @pytest.mark.parametrize("engine", [MujocoWheelset, ExudynWheelset])
 def test_accelerations_are_those_of_the_equations(engine):
     written, built = Equations(ON_PROFILES, 50.0), engine(ON_PROFILES, 50.0)
-    states = written.rest + LIVELY * np.random.default_rng(4).normal(size=(60, eq.STATES))
+    states = written.rest + LIVELY * np.random.default_rng(4).normal(size=(60, eq.STATE_COUNT))
     states[::3, [eq.Y, eq.Z, eq.ROLL]] += [6.5e-3, -6e-4, -1e-3]
-    contact, out, seen = written.blank(), np.empty(eq.STATES), []
+    contact, out, seen = written.empty_contacts(), np.empty(eq.STATE_COUNT), []
     for state in states:
         eq.rates(state, *written.parameters, out, contact)
         seen.append(contact.copy())
@@ -96,7 +96,7 @@ def test_accelerations_are_those_of_the_equations(engine):
 def test_paths_over_a_second_with_flange_contact():
     kinds = (Equations, MujocoWheelset, ExudynWheelset)
     built = [kind(ON_PROFILES, 40.0, cells=7) for kind in kinds]
-    start = built[0].displaced(6e-3)
+    start = built[0].displaced_state(6e-3)
     start[eq.Y_RATE] = 0.1
     reference, mujoco, exudyn = (one.run(start, 1.0, 2.5e-4) for one in built)
     right = reference.contacts[:, :2]
@@ -112,11 +112,11 @@ def test_paths_over_a_second_with_flange_contact():
 
 def worst(wheelset, speed, law, shift, step, duration):
     equations = Equations(wheelset, speed, law, 7)
-    found = ledger(equations, equations.run(equations.displaced(shift), duration, step))
+    found = energy_ledger(equations, equations.run(equations.displaced_state(shift), duration, step))
     return float(np.abs(found.residual).max()), found
 
 
-@pytest.mark.parametrize("wheelset", [CHOSEN, ON_PROFILES], ids=["cones", "profiles"])
+@pytest.mark.parametrize("wheelset", [CHOSEN_WHEELSET, ON_PROFILES], ids=["cones", "profiles"])
 def test_ledger_closes_to_the_order_of_rk4(wheelset):
     (one, _), (two, found) = (worst(wheelset, 40.0, "linear", 2e-3, step, 0.1) for step in (4e-4, 2e-4))
     assert math.log2(one / two) > 3.7  # 4.02 on cones; steps of 1e-4 leave 3e-9 J, half of it rounding
@@ -134,20 +134,20 @@ def test_ledger_with_friction_and_flange():
 def test_standstill_reversal_and_lift_off():
     equations = Equations(ON_PROFILES, 50.0)
     _, *given = equations.parameters
-    state, contact = equations.displaced(5e-3), equations.blank()
+    state, contact = equations.displaced_state(5e-3), equations.empty_contacts()
     state[eq.SPIN] = 0.0
     found = []
     for speed in (-1e-9, 0.0, 1e-9):
-        out = np.empty(eq.STATES)
+        out = np.empty(eq.STATE_COUNT)
         eq.rates(state, speed, *given, out, contact)
         found.append(out)
     assert np.isfinite(found).all()
-    np.testing.assert_allclose(found, np.broadcast_to(found[1], (3, eq.STATES)), rtol=1e-6, atol=2e-3)
+    np.testing.assert_allclose(found, np.broadcast_to(found[1], (3, eq.STATE_COUNT)), rtol=1e-6, atol=2e-3)
     state[eq.Z] -= 1e-2
     rates = equations.rates(state)
     assert np.isfinite(rates).all()
     assert rates[eq.SPIN] == 0.0  # nothing touches
-    path = Equations(ON_PROFILES, 40.0, cells=7).run(equations.rest - 2e-4 * np.eye(eq.STATES)[eq.Z], 0.05, 2e-4)
+    path = Equations(ON_PROFILES, 40.0, cells=7).run(equations.rest - 2e-4 * np.eye(eq.STATE_COUNT)[eq.Z], 0.05, 2e-4)
     assert (path.contacts["load"][0] == 0.0).all()
     assert (path.contacts["load"][-1, [1, 3]] > 0.0).all()
 
@@ -159,7 +159,9 @@ def test_load_passes_between_patches_without_a_jump():
     for shift in np.arange(4.6e-3, 5.2e-3, 1e-6):
         touches = np.zeros(4, TOUCH)
         wf.contact_points(Pose(shift, -1.1e-4, -3.6e-4, 0.0), rails, touches)
-        loads.append([pressed(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches[:2]])
+        loads.append(
+            [normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches[:2]]
+        )
     loads = np.array(loads)
     assert (loads > 0.0).any(axis=0).all()
     assert loads[0, 0] == 0.0
@@ -169,16 +171,16 @@ def test_load_passes_between_patches_without_a_jump():
 def test_wave_is_that_of_the_cones_that_steer_alike():
     cones = steering_cones(ON_PROFILES, 3e-3)
     equations = Equations(FREE, 10.0, "linear")
-    path = equations.run(equations.displaced(3e-3), 1.8, 4e-4)
+    path = equations.run(equations.displaced_state(3e-3), 1.8, 4e-4)
     y = path.states[:, eq.Y]
     crossing = path.times[1:][(y[1:] < 0.0) != (y[:-1] < 0.0)]
     # The first harmonic leaves out the others, and the amplitude falls: 3.5 % seen, where the profiles bear 0.16.
-    assert 10.0 * 2.0 * np.diff(crossing)[1] == pytest.approx(klingel(cones), rel=0.06)
+    assert 10.0 * 2.0 * np.diff(crossing)[1] == pytest.approx(klingel_wavelength(cones), rel=0.06)
     assert 0.15 < cones.equivalent_conicity < 0.2
 
 
 def test_what_is_no_profile_is_refused():
     with pytest.raises(InputError, match="built in"):
-        equilibrium(CHOSEN.changed(profiles=Profiles(wheel="S1003")), 0.0)
+        equilibrium(CHOSEN_WHEELSET.changed(profiles=Profiles(wheel="S1003")), 0.0)
     with pytest.raises(InputError, match="cones"):
-        equilibrium(CHOSEN, 0.0)
+        equilibrium(CHOSEN_WHEELSET, 0.0)

@@ -9,14 +9,20 @@ import pytest
 
 from models.core.assumptions import broken_of
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import named_effects, without
+from models.core.scene_effects import named_effects, scene_without
 from models.rail import equations as eq
-from models.rail.eigenvalues import free_wheelset, growth
+from models.rail.eigenvalues import free_wheelset, largest_growth
 from models.rail.equations import Equations
-from models.rail.flange_climbing import bound_shares, nadal
-from models.rail.limit_cycle import attained, beginning, branch, refined, solved_orbit
+from models.rail.flange_climbing import bound_shares, nadal_limit
+from models.rail.limit_cycle import (
+    attained_cycle,
+    branch_of_orbits,
+    orbit_of_small_amplitude,
+    refined_orbit,
+    solved_orbit,
+)
 from models.rail.linear import NoCriticalSpeed, critical_or_why, critical_speed
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.wheelset import plan
 from models.systems.wheelset.of_scene import path_speeds, wheelset_of
 from models.systems.wheelset.run import run
@@ -31,7 +37,9 @@ SCENE = {
     "speeds": {"start": 50.0, "stop": 80.0, "count": 4},
     "run": {"duration": 0.2, "speeds": [60.0]},
 }
-OWN = "".join(f"{key} = {value}\n" for key, value in CHOSEN.model_dump(exclude={"material", "profiles"}).items())
+OWN = "".join(
+    f"{key} = {value}\n" for key, value in CHOSEN_WHEELSET.model_dump(exclude={"material", "profiles"}).items()
+)
 
 
 def scene(**tables):
@@ -78,7 +86,7 @@ def test_wheelsets_that_cannot_be(table, place, words):
 def test_a_wheelset_of_ones_own(tmp_path):
     (tmp_path / "mine.toml").write_text(OWN.replace("mass = 1200.0", "mass = 1300.0"))
     own = wheelset_of(build(SCENE | {"wheelset": {"parameters": "mine.toml", "override": {"load": 9e4}}}, "", tmp_path))
-    assert own == CHOSEN.changed(mass=1300.0, load=9e4)
+    assert own == CHOSEN_WHEELSET.changed(mass=1300.0, load=9e4)
     (tmp_path / "mine.toml").write_text(OWN.replace("mass", "maas"))
     with pytest.raises(InputError, match=r"mine\.toml: maas.*did you mean 'mass'"):
         wheelset_of(build(SCENE | {"wheelset": {"parameters": "mine.toml"}}, "", tmp_path))
@@ -103,8 +111,8 @@ def test_without_a_critical_speed_the_study_says_so(tmp_path):
     stiff = {"stiffness_x": 1e8, "stiffness_y": 1e8, "damping_x": 1e5, "damping_y": 1e5}
     one = scene(wheelset={"override": stiff}, run={"duration": 0.02, "step": 1e-4})
     assert path_speeds(one) == [80.0]
-    assert critical_or_why(wheelset_of(one), partial(growth, Equations))[0] is None
-    assert "none: the wheelset is stable up to 200 m/s" in wheelset._stability(wheelset_of(one), {})[1]
+    assert critical_or_why(wheelset_of(one), partial(largest_growth, Equations))[0] is None
+    assert "none: the wheelset is stable up to 200 m/s" in wheelset._stability_lines(wheelset_of(one), {})[1]
     found = limit_cycle.run(scene(wheelset={"override": stiff}, run={}), ("reference",), tmp_path, lambda *_: None)
     assert found["answer"] == {"branch": [], "cycles": {}}
     assert any("no branch begins" in line for line in found["table"])
@@ -128,26 +136,28 @@ def test_the_study_saves_what_it_says(tmp_path):
 
 def test_no_critical_speed_is_told_apart():
     with pytest.raises(NoCriticalSpeed) as told:
-        critical_speed(free_wheelset(CHOSEN).changed(mass=1e4, yaw_inertia=3e4), partial(growth, Equations))
+        critical_speed(
+            free_wheelset(CHOSEN_WHEELSET).changed(mass=1e4, yaw_inertia=3e4), partial(largest_growth, Equations)
+        )
     assert told.value.unstable
 
 
 def test_a_branch_stands_upright_until_flanges_touch():
-    first = beginning(Equations(CHOSEN, 60.0, cells=7), 1e-3, 5e-4)
-    low, high = branch(first, [5e-3, 7.3e-3])
+    first = orbit_of_small_amplitude(Equations(CHOSEN_WHEELSET, 60.0, cells=7), 1e-3, 5e-4)
+    low, high = branch_of_orbits(first, [5e-3, 7.3e-3])
     assert abs(low.speed - first.speed) < 0.01 < 1.0 < high.speed - low.speed
     assert low.multiplier > 0.99 and high.multiplier < 0.2
-    half = refined(high, "speed")
+    half = refined_orbit(high, "speed")
     assert 0.0 < half.error < 1e-4 * half.speed and half.amplitude == high.amplitude
     path = high.path()
     assert path.states[-1, eq.YAW] == pytest.approx(path.states[0, eq.YAW], abs=1e-11)
 
 
 def test_orbits_that_are_none():
-    assert attained(Equations(CHOSEN, 40.0, cells=7), start=1e-3) is None
-    orbit = attained(Equations(CHOSEN, 75.0, cells=7))
+    assert attained_cycle(Equations(CHOSEN_WHEELSET, 40.0, cells=7), start=1e-3) is None
+    orbit = attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=7))
     with pytest.raises(RunFailed, match="no periodic motion"):
-        solved_orbit(replace(orbit, equations=Equations(CHOSEN, 20.0, cells=7)), "amplitude")
+        solved_orbit(replace(orbit, equations=Equations(CHOSEN_WHEELSET, 20.0, cells=7)), "amplitude")
 
 
 def test_what_the_scene_does_not_name_is_absent():
@@ -163,7 +173,7 @@ def test_limit_cycles_need_a_bound_and_a_range():
 
 def test_limit_of_climbing() -> None:
     """Without friction a flange climbs only beyond the tangent of its angle; a wheel without load climbs at once."""
-    assert nadal(0.0) == pytest.approx(np.tan(np.radians(70.0)), rel=1e-15)
+    assert nadal_limit(0.0) == pytest.approx(np.tan(np.radians(70.0)), rel=1e-15)
     force, load = np.array([0.0, 0.0, -2e4, 1e3]), np.array([0.0, 1e4, 1e4, 0.0])
     assert bound_shares(force, load).tolist() == [0.0, 0.0, 2.0, np.inf]
 
@@ -175,13 +185,13 @@ def test_the_flange_of_a_cone_is_not_silently_unread_beside_profiles() -> None:
 
 
 def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tmp_path) -> None:
-    values = CHOSEN.model_dump(exclude={"material", "profiles"})
+    values = CHOSEN_WHEELSET.model_dump(exclude={"material", "profiles"})
     lines = "\n".join(f"{key} = {value!r}" for key, value in values.items())
     (tmp_path / "own.toml").write_text(f"{lines}\n[profiles]\nwheel = 'S1002'\n")
     own = scene(wheelset={"parameters": str(tmp_path / "own.toml")})
     assert "profiles" in named_effects(own) and "flange" not in named_effects(own)
     with pytest.raises(InputError, match=r"wheelset.parameters = .*has profiles: name a file without them"):
-        without(own, "profiles")
+        scene_without(own, "profiles")
 
 
 @pytest.mark.parametrize(

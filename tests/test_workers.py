@@ -11,15 +11,15 @@ from mortal_job import Mortal
 
 from models.core.errors import InputError
 from models.ensemble.runner import Blocks, in_order, run_paths
-from models.ensemble.workers import Crew, processes
+from models.ensemble.workers import Crew, process_pool
 from models.identification.fit import fit
 from models.identification.problem import FitClock, Parameter, Problem, measured_channel
-from models.identification.uncertainty import profile, uncertainty
+from models.identification.uncertainty import likelihood_profile, uncertainty
 from models.systems.braking.stops import Stops
 from models.systems.ride.nonlinear import CopiesBySpeed, Sampling
 from studies.command.asked import load_scene
 from studies.command.crew import given_crew
-from validation.ride.in_engines import ride
+from validation.ride.in_engines import vehicle_and_road
 
 
 def stops():
@@ -28,13 +28,13 @@ def stops():
 
 
 def copies():
-    vehicle, road = ride("quarter_car")
+    vehicle, road = vehicle_and_road("quarter_car")
     return CopiesBySpeed(vehicle, road, (15.0, 20.0, 25.0), Sampling(copies=8, lasting=0.5, seed=4))
 
 
 @pytest.fixture(scope="module")
 def pool():
-    with processes(2) as executor:
+    with process_pool(2) as executor:
         yield executor
 
 
@@ -58,10 +58,10 @@ def test_profiles_of_a_fit_are_the_same_by_two_workers(pool):
     clock = FitClock(times)
     channel = measured_channel("y", "-", (times, 1.0 + 2.0 * times + 0.1 * random.standard_normal(200)), clock)
     known = uncertainty(fit(Problem(straight, [Parameter("a", 0.5), Parameter("b", 1.0)], [channel], clock)))
-    shared = list(in_order(partial(profile, known), iter([0, 1]), pool))
+    shared = list(in_order(partial(likelihood_profile, known), iter([0, 1]), pool))
     assert [k for k, _ in shared] == [0, 1]
     for k, made in shared:
-        alone = profile(known, k)
+        alone = likelihood_profile(known, k)
         assert np.array_equal(made.values, alone.values) and np.array_equal(made.rise, alone.rise)
     assert not np.array_equal(shared[0][1].rise, shared[1][1].rise)
 
@@ -113,6 +113,6 @@ def test_workers_killed_at_random_moments_change_nothing(workers, kills, tmp_pat
                 killed.append(process)
                 return
 
-    with processes(workers) as executor:
+    with process_pool(workers) as executor:
         found = run_paths(Mortal(tmp_path), 200, executor=executor, blocks=Blocks(1), progress=kill)["x"]
     assert 2 * len(killed) >= kills and np.array_equal(found, np.sqrt(np.arange(200)))

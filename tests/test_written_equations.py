@@ -16,13 +16,13 @@ from models.multibody.plain.road import driven, surface
 from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import build, run
-from studies.command.asked import SCENES, engines_of
+from studies.command.asked import SCENES_FOLDER, engines_of
 from validation.faults.campaign import seeing_checks
 from validation.faults.written import CAMPAIGN
-from validation.spatial.cars import static
+from validation.spatial.cars import static_forces
 from validation.spatial.written_equations import (
     bristles_gap,
-    curved,
+    curved_vehicle,
     cut_cars,
     hub_gap,
     hub_path_gap,
@@ -98,7 +98,7 @@ def test_engines_on_request_run_where_they_are_named():
 def test_a_scene_of_handling_runs_in_the_reference():
     """Every manoeuvre of the shipped scene, some steps of each; reports are the reference's own."""
     scene = load(
-        SCENES / "handling.toml",
+        SCENES_FOLDER / "handling.toml",
         [f"manoeuvres.{name}.duration=0.006" for name in ("step_steer", "lane_change", "brake_in_curve")],
     )
     for name in scene.manoeuvres:
@@ -119,7 +119,7 @@ def test_a_run_that_blows_up_fails():
 def test_curves_of_the_description_press():
     """A car with curves is not the car without: the comparison of the curved one compares them."""
     car = rolling_cars()["curved"]
-    without = car.changed(given=replace(curved(), springs=rolling_cars()["r19_free"].given.springs))
+    without = car.changed(given=replace(curved_vehicle(), springs=rolling_cars()["r19_free"].given.springs))
     q, v = car.straight(10.0)
     v[5:] += 0.3
     ours, others = (build("reference", each).acceleration(0.0, q, v) for each in (car, without))
@@ -129,7 +129,7 @@ def test_curves_of_the_description_press():
 def test_a_cut_car_rests_on_its_static_loads():
     vehicle = cut_cars()["twin"]
     still = np.zeros(vehicle.size)
-    model = hub_model(PLAIN, vehicle, static(vehicle, 3), 1e-3, 1e-3)
+    model = hub_model(PLAIN, vehicle, static_forces(vehicle, 3), 1e-3, 1e-3)
     assert np.abs(model.acceleration(0.0, still, still)).max() < 1e-9
 
 

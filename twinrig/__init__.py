@@ -54,9 +54,9 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("twinrig")
-    from models.core.errors import nearest
+    from models.core.errors import nearest_names_phrase
 
-    raise AttributeError(f"twinrig has no {name!r}{nearest(name, tuple(__all__))}")
+    raise AttributeError(f"twinrig has no {name!r}{nearest_names_phrase(name, tuple(__all__))}")
 
 
 def __dir__() -> list[str]:

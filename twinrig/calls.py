@@ -62,10 +62,10 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     of handling, ``case`` of wheel and rail, or ``speed`` (m/s) of a wheelset. Raises InputError before anything is run,
     RunFailed where there is no answer. What is unlikely of the input, such as a mass in tonnes, stands in the result.
     """
-    from models.core.finding import gathered, queries
+    from models.core.finding import findings_as_dicts, merged_findings
     from models.systems import run as run_system
     from studies.command.asked import findings_of, plan_of
-    from studies.command.waiting import waiting
+    from studies.command.waiting import progress_bar
     from twinrig.result import Result
 
     loaded = load(scene, set).checked
@@ -74,8 +74,8 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
     with _as_library(loaded):
         plan_of(loaded).check(loaded, checked)
-        doubtful = queries(gathered(findings_of(loaded)))
-        with waiting(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
+        doubtful = findings_as_dicts(merged_findings(findings_of(loaded)))
+        with progress_bar(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
             answer = run_system(loaded, chosen, error=error, **how)
     answer.data.attrs["queries"] = json.dumps(doubtful)
     return Result(answer.data, answer.detail)
@@ -130,7 +130,7 @@ def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
 
     What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
     """
-    from studies.command.asked import causes
+    from studies.command.asked import query_lines
 
     try:
         yield
@@ -139,7 +139,7 @@ def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
             option = error.file.lstrip("-")
             renamed = InputError(names.get(option, option), error.place, error.value, error.allowed, error.choices)
             raise renamed from None
-        for line in causes(scene) if scene is not None else ():
+        for line in query_lines(scene) if scene is not None else ():
             error.add_note(line)
         raise
 
@@ -165,13 +165,13 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     nothing in common.
     """
     from models.measured.file_kinds import is_measurement
-    from studies.command.comparison import compare_runs, lines
+    from studies.command.comparison import compare_runs, comparison_lines
     from twinrig.report import Report
 
     if isinstance(second, str | Path) and Path(second).suffix != ".nc" and is_measurement(Path(second)):
-        from studies.command.against_measurement import overlay
+        from studies.command.against_measurement import overlay_of_run
 
-        laid = overlay(_result(first), second, shift)
+        laid = overlay_of_run(_result(first), second, shift)
         values = {"shift": laid.shift.seconds, "channels": {each.name: each.values() for each in laid.matches}}
         return Report((f"{second} over {_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
@@ -179,7 +179,7 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     names = (_name(first, "the first"), _name(second, "the second"))
     differences, notes = compare_runs(_result(first), _result(second), names)
     values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in differences}
-    return Report((f"{names[1]} less {names[0]}", *lines(differences, notes)), values, differences)
+    return Report((f"{names[1]} less {names[0]}", *comparison_lines(differences, notes)), values, differences)
 
 
 def _result(given: Any) -> "Result":
@@ -209,17 +209,17 @@ def price(
     have no steps to choose, RunFailed where nothing is known.
     """
     from models.advice.price.recommendation import price as recommended
-    from models.advice.price.text import as_dict, lines
+    from models.advice.price.text import as_dict, recommendation_lines
     from studies.command.asked import engines_of
-    from studies.command.waiting import waiting
+    from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
     with _as_library(loaded):
         engines = engines_of(engine, loaded.system, "engine")
-        with waiting("runs of every engine in ever finer steps", loaded.system):
+        with progress_bar("runs of every engine in ever finer steps", loaded.system):
             answer = recommended(loaded, tolerance, quantity, engines)
-    return Report(tuple(lines(answer)), as_dict(answer), answer)
+    return Report(tuple(recommendation_lines(answer)), as_dict(answer), answer)
 
 
 def choose(
@@ -239,9 +239,9 @@ def choose(
     """
     from tempfile import TemporaryDirectory
 
-    from models.core.told import summarised
+    from models.core.told import summary_with_errors
     from studies.command.asked import checked_study, engines_of
-    from studies.command.waiting import waiting
+    from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = _choosing(load(scene, set), quantities, tolerance).checked
@@ -249,8 +249,8 @@ def choose(
     with _as_library(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
         kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
-        with waiting(loaded.title, loaded.system) as progress:
-            summary = summarised(study.run(loaded, engines, kept, progress))
+        with progress_bar(loaded.title, loaded.system) as progress:
+            summary = summary_with_errors(study.run(loaded, engines, kept, progress))
     return Report((loaded.title, *summary["table"]), summary)
 
 
@@ -276,14 +276,14 @@ def export(scene: AnyScene, engine: str, file: str | Path | None = None, *, set:
     InputError for a scene without a vehicle that an engine builds, and for a file that is there already.
     """
     from studies.command.export import export as write
-    from studies.command.export import lines
-    from studies.command.waiting import waiting
+    from studies.command.export import export_lines
+    from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library(loaded, out="file"), waiting("building the vehicle", loaded.system):
+    with _as_library(loaded, out="file"), progress_bar("building the vehicle", loaded.system):
         told = write(loaded, engine, None if file is None else Path(file))
-    return Report(tuple(lines(loaded.title, told)), told)
+    return Report(tuple(export_lines(loaded.title, told)), told)
 
 
 def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":

@@ -11,7 +11,7 @@ from models.core import result as saved
 from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
 from models.core.discretisation import Estimate, errors_of
 from models.core.errors import InputError
-from models.core.told import lines, remarks
+from models.core.told import figure_remarks, message_lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +70,7 @@ class Result(saved.Result):
             f"  {query['weight']}: {query['text']}" for query in queries
         ]
         place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
-        return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *lines({self._label: self})]
+        return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *message_lines({self._label: self})]
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
         """Name, unit, axes, least, largest and meaning of each channel."""
@@ -132,7 +132,7 @@ class Result(saved.Result):
         """Title the plot with the scene's title, the engine and the warnings about the result."""
         from textwrap import fill
 
-        texts = (f"{self.data.attrs.get('title', '')}, {self._label}", *remarks({self._label: self}))
+        texts = (f"{self.data.attrs.get('title', '')}, {self._label}", *figure_remarks({self._label: self}))
         axes.set_title("\n".join(fill(text, WRAPPED) for text in texts), fontsize="small")
 
     def to_pandas(self, *channels: str) -> "pd.DataFrame":

@@ -20,23 +20,31 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.outside import register
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common import checks
-from validation.common.rows import Independence, Observed, Row, System, behaves, not_run
-from validation.common.scenes import VEHICLES, force_scene, road_scene
+from validation.common.rows import Independence, Observed, Row, System, behaviour_row, not_run
+from validation.common.scenes import VEHICLE_SETS, force_scene, road_scene
 from validation.hard_cases.case import CaseOutcome, judge
 from validation.run import save, say
 
 SYSTEM: System = "pitch-plane"
-FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes")
+HARD_CASE_FAMILIES = (
+    "stepping",
+    "sampled_input",
+    "contact_points",
+    "prescribed_pitch",
+    "stabilisers",
+    "invariants",
+    "extremes",
+)
 """Families of hard cases that any engine of the pitch plane can be put through."""
 STEP, DURATION = 1e-3, 0.5
-HALVED = (5e-4, 2.5e-4)
+ORDER_STEPS = (5e-4, 2.5e-4)
 """Steps (s) between which the order is measured, as in the report: RK4 is not asymptotic at 1 ms yet."""
 TOLERANCE = 1e-9
 """Asked of a method that keeps one."""
-LOOSE = 1e-4
+LOOSE_TOLERANCE = 1e-4
 """Largest state error (m, rad, m/s, rad/s) of a method of order 4 or more at 1 ms; RK4 has 1e-6."""
 ROUNDING_ERROR = 1e-11
 """Errors below this are rounding, in which no order shows."""
@@ -45,7 +53,9 @@ EXACT_BOUND = 1e3 * TOLERANCE
 """Bound, in SI or as a share, of what is exact to rounding in fixed steps, for a method that keeps a tolerance."""
 BY_STEPS = ("of the error at the double step", "orders lost")
 """Units of hard cases that compare two steps: they say nothing of a method that keeps a tolerance, or of low order."""
-OTHERS = "only the pitch-plane vehicle is built for engines from outside: this table says nothing of other systems"
+OTHER_SYSTEMS_NOTE = (
+    "only the pitch-plane vehicle is built for engines from outside: this table says nothing of other systems"
+)
 
 Check = tuple[str, str, str, float, str, Callable[[], float]]
 
@@ -57,7 +67,7 @@ def conformity(name: str, folder: Path, command: str) -> int:
     """
     register(name)
     with TemporaryDirectory() as cases_folder:
-        rows = list(_printed_rows(_rows(name, Path(cases_folder))))
+        rows = list(_printed_rows(_conformity_rows(name, Path(cases_folder))))
     (folder / "data").mkdir(exist_ok=True)
     save(
         folder,
@@ -79,22 +89,24 @@ def conformity(name: str, folder: Path, command: str) -> int:
 def _printed_rows(rows: Iterator[Row]) -> Iterator[Row]:
     """Print each row as soon as it is computed, because a slow engine takes minutes; yields the rows."""
     for row in rows:
-        print(f"  {row.status:<8} {row.quantity:<86} {_value(row):>12}  {row.reason}", flush=True)
+        print(f"  {row.status:<8} {row.quantity:<86} {_value_text(row):>12}  {row.reason}", flush=True)
         yield row
 
 
-def _value(row: Row) -> str:
+def _value_text(row: Row) -> str:
     return f"{row.value:.3g}" if isinstance(row.value, int | float) else str(row.value or "")
 
 
-def _rows(name: str, folder: Path) -> Iterator[Row]:
+def _conformity_rows(name: str, folder: Path) -> Iterator[Row]:
     second: Independence = "shared kernel" if hasattr(OUTSIDE[name], "integrate") else "native"
-    for id, quantity, unit, bound, why, error in _checks(name, folder):
+    for id, quantity, unit, bound, why, error in _checks_of_engine(name, folder):
         yield _error_row(f"conformity.{id}", quantity, unit, bound, why, error, second)
     yield _order(name, second)
-    yield _guards(name, folder)
+    yield _guard_row(name, folder)
     yield from _hard_cases(name, folder)
-    yield not_run("conformity.others", SYSTEM, "wheelset, contact, ride, handling, hub forces, braking", OTHERS)
+    yield not_run(
+        "conformity.others", SYSTEM, "wheelset, contact, ride, handling, hub forces, braking", OTHER_SYSTEMS_NOTE
+    )
 
 
 def _error_row(
@@ -107,7 +119,7 @@ def _error_row(
         return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, why, second, "failed", str(reason))
 
 
-def _settings(name: str, step: float = STEP) -> Settings:
+def _settings_of_engine(name: str, step: float = STEP) -> Settings:
     return Settings(name, step, DURATION, TOLERANCE)
 
 
@@ -126,9 +138,9 @@ def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
     return path
 
 
-def _checks(name: str, folder: Path) -> Iterator[Check]:
-    make, settings = checks.engine(name), _settings(name)
-    for vehicle in VEHICLES:
+def _checks_of_engine(name: str, folder: Path) -> Iterator[Check]:
+    make, settings = checks.engine(name), _settings_of_engine(name)
+    for vehicle in VEHICLE_SETS:
         for geometry in ("exact", "linear"):
             yield (
                 f"audit.{vehicle}.{geometry}",
@@ -142,18 +154,18 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
         "equilibrium",
         "distance from the static equilibrium on a flat road",
         "m, rad, m/s, rad/s",
-        EXACT_BOUND if _adaptive(name) else 1e-9,
+        EXACT_BOUND if _is_adaptive(name) else 1e-9,
         "nothing moves what is at rest, beyond a kept tolerance",
         partial(_at_rest, name, settings),
     )
-    for kind, scene in _paths(folder).items():
+    for kind, scene in _scenes_of_paths(folder).items():
         yield (
             f"path.{kind}",
             f"largest state error, {kind}, against the reference by DOP853 at 1e-13",
             "m, rad, m/s, rad/s",
-            _bound(name),
+            _difference_bound(name),
             f"{DURATION:g} s at {STEP:g} s, RK4 has 1e-6 at most",
-            partial(_state_error, name, assemble(scene), settings),
+            partial(_state_error, name, assembly_of_scene(scene), settings),
         )
     yield (
         "momentum",
@@ -161,31 +173,31 @@ def _checks(name: str, folder: Path) -> Iterator[Check]:
         "of weight times time",
         _momentum_bound(name),
         "an invariant of any vehicle, exact from order 2 on for forces linear over each step",
-        partial(_momentum, name, assemble(_paths(folder)["wheel forces, linear"]), settings),
+        partial(_momentum_error, name, assembly_of_scene(_scenes_of_paths(folder)["wheel forces, linear"]), settings),
     )
 
 
 def _road(vehicle: str, geometry: str) -> Assembly:
     audit = import_module("validation.cases.audit")
-    return assemble(audit.scene(vehicle, geometry))
+    return assembly_of_scene(audit.scene(vehicle, geometry))
 
 
-def _adaptive(name: str) -> bool:
+def _is_adaptive(name: str) -> bool:
     return bool(getattr(OUTSIDE[name], "adaptive", False))
 
 
-def _bound(name: str) -> float:
+def _difference_bound(name: str) -> float:
     """Tolerance of the difference from the reference: loose for methods of low order, whose order has a row of its
     own."""
     order = CATALOGUE[name][name].order
-    return 1e-5 if _adaptive(name) else LOOSE if order >= 4 else 0.5
+    return 1e-5 if _is_adaptive(name) else LOOSE_TOLERANCE if order >= 4 else 0.5
 
 
 def _momentum_bound(name: str) -> float:
-    return 1e-7 if _adaptive(name) else 1e-9 if CATALOGUE[name][name].order > 1 else 1e-2
+    return 1e-7 if _is_adaptive(name) else 1e-9 if CATALOGUE[name][name].order > 1 else 1e-2
 
 
-def _paths(folder: Path) -> dict[str, Any]:
+def _scenes_of_paths(folder: Path) -> dict[str, Any]:
     """Scenes whose paths are compared: a road, and wheel forces read in two ways."""
     if not (folder / "wheel_forces.csv").exists():
         write_measurement(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
@@ -207,12 +219,12 @@ def _state_error(name: str, assembly: Assembly, settings: Settings) -> float:
 def _at_rest(name: str, settings: Settings) -> float:
     from models.systems.pitch_plane.scene import build
 
-    flat = assemble(build({"title": "at rest", "run": {"duration": DURATION, "step": STEP}}))
+    flat = assembly_of_scene(build({"title": "at rest", "run": {"duration": DURATION, "step": STEP}}))
     _run(name, flat, settings)
     return checks.equilibrium_gap(checks.engine(name), flat, settings)
 
 
-def _momentum(name: str, assembly: Assembly, settings: Settings) -> float:
+def _momentum_error(name: str, assembly: Assembly, settings: Settings) -> float:
     _run(name, assembly, settings)
     return checks.momentum_gap(checks.engine(name), assembly, settings)
 
@@ -220,36 +232,37 @@ def _momentum(name: str, assembly: Assembly, settings: Settings) -> float:
 def _order(name: str, second: Independence) -> Row:
     """Row: observed order of a fixed-step method; for an adaptive one, that a tighter tolerance gives a smaller
     error."""
-    road = assemble(road_scene(duration=DURATION))
-    if _adaptive(name):
+    road = assembly_of_scene(road_scene(duration=DURATION))
+    if _is_adaptive(name):
         return _error_row(
             "conformity.tolerance",
             "error at a tolerance of 1e-9 by that at 1e-5",
             "ratio",
             0.1,
             "a method that keeps a tolerance is the more exact the tighter it is",
-            partial(_tightened, name, road),
+            partial(_tightened_error, name, road),
             second,
         )
     declared, why = CATALOGUE[name][name].order, "one halving; the band leaves room for the next term of the error"
 
     def gap() -> float:
-        truth = _reference_run(road, HALVED[-1])
-        errors = [checks.state_gap(_run(name, road, _settings(name, step)), truth) for step in HALVED]
+        truth = _reference_run(road, ORDER_STEPS[-1])
+        errors = [checks.state_gap(_run(name, road, _settings_of_engine(name, step)), truth) for step in ORDER_STEPS]
         return 0.0 if errors[0] < ROUNDING_ERROR else abs(float(np.log2(errors[0] / errors[1])) - declared)
 
     return _error_row("conformity.order", f"observed order less the declared {declared}", "", 0.35, why, gap, second)
 
 
-def _tightened(name: str, road: Assembly) -> float:
+def _tightened_error(name: str, road: Assembly) -> float:
     loose = Settings(name, STEP, DURATION, 1e-5)
     errors = [
-        checks.state_gap(_run(name, road, settings), _reference_run(road)) for settings in (loose, _settings(name))
+        checks.state_gap(_run(name, road, settings), _reference_run(road))
+        for settings in (loose, _settings_of_engine(name))
     ]
     return errors[1] / errors[0] if errors[0] > ROUNDING_ERROR else 0.0
 
 
-def _guards(name: str, folder: Path) -> Row:
+def _guard_row(name: str, folder: Path) -> Row:
     """Row: wheel forces of a million times the weight throw the vehicle out of all bounds, which must raise an
     error."""
     throw = folder / "throw"
@@ -261,13 +274,13 @@ def _guards(name: str, folder: Path) -> Row:
     meant = {"file": "wheel_forces.csv", "interpolation": "linear", "accept": ["weight", "unit", "sign"]}
     try:
         scene = force_scene(throw, duration=DURATION, effects={"wheel_forces": meant})
-        _run(name, assemble(scene), _settings(name))
+        _run(name, assembly_of_scene(scene), _settings_of_engine(name))
         ended = "silent"
     except RunFailed:
         ended = "raised"
     except InputError:
         ended = "refused"
-    return behaves(
+    return behaviour_row(
         "conformity.guard",
         SYSTEM,
         "a run that leaves all bounds",
@@ -279,15 +292,15 @@ def _guards(name: str, folder: Path) -> Row:
 
 def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
     built_in = {name, *(integrator for integrators in CATALOGUE.values() for integrator in integrators)}
-    for family in FAMILIES:
+    for family in HARD_CASE_FAMILIES:
         for case in import_module(f"validation.hard_cases.{family}").CASES:
             id = f"conformity.hard.{case.name.replace(',', '').replace(' ', '-')}"
             quantity, case_folder = f"hard case: {case.name}: {case.check}", folder / id
             case_folder.mkdir()
-            if case.unit in BY_STEPS and (_adaptive(name) or CATALOGUE[name][name].order < 4):
+            if case.unit in BY_STEPS and (_is_adaptive(name) or CATALOGUE[name][name].order < 4):
                 yield not_run(id, SYSTEM, quantity, "compares steps of a method of order 4")
                 continue
-            if _adaptive(name):
+            if _is_adaptive(name):
                 case = replace(case, tolerance=max(case.tolerance, EXACT_BOUND))
             try:
                 outcome = judge(case, name, case_folder)
@@ -297,7 +310,7 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
                     continue
                 outcome = CaseOutcome("SILENT", float("inf"), f"{type(error).__name__}: {error}")
             good = outcome.word != "SILENT"
-            yield behaves(
+            yield behaviour_row(
                 id,
                 SYSTEM,
                 quantity,

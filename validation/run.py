@@ -25,15 +25,15 @@ import numpy as np
 from models.core.result import provenance
 from models.core.whole_files import whole_file, write_whole
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.store import Arrays, code, locked
+from models.ensemble.store import Arrays, checksum_of_sources, exclusive_folder
 from models.ensemble.workers import Crew
 from validation.cases import CASES
-from validation.common.changes import against, lines
-from validation.common.rows import STATUSES, Row, Saved, failed, rested
+from validation.common.changes import change_lines, comparison_with_earlier
+from validation.common.rows import STATUSES, Row, Saved, failed_row, rows_on_grounds
 from validation.common.scenes import data_folder
-from validation.report.shares import full
+from validation.report.shares import full_report_data
 
-SEEDED = (
+SEEDED_MODULES = (
     "models.machine.timing",
     "validation.choice.drawn_scenes",
     "validation.common.checks",
@@ -69,7 +69,7 @@ class Cases:
 
     def __call__(self, paths: range) -> Arrays:
         """``record`` (n,): rows and seconds of each case as JSON."""
-        return _array([self.record(self.names[i]) for i in paths])
+        return _array_of_record([self.record(self.names[i]) for i in paths])
 
     def record(self, name: str) -> Saved:
         """Measure one case; exceptions of the case pass through."""
@@ -78,7 +78,7 @@ class Cases:
         with TemporaryDirectory(
             ignore_cleanup_errors=True
         ) as case_folder:  # what cases write to run is no part of the report
-            rows, data = rested(name, partial(case.measure, self.quick, Path(case_folder)))
+            rows, data = rows_on_grounds(name, partial(case.measure, self.quick, Path(case_folder)))
         write_whole(self.folder / "data" / f"{name}.json", json.dumps(data).encode())
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
@@ -95,16 +95,16 @@ class Cases:
             "cases": list(self.names),
             "quick": self.quick,
             "measured files": sizes,
-            "code of validation": code(here),
-            "code of studies": code(here.parent / "studies"),
+            "code of validation": checksum_of_sources(here),
+            "code of studies": checksum_of_sources(here.parent / "studies"),
         }
 
 
-def _array(records: list[Saved]) -> Arrays:
+def _array_of_record(records: list[Saved]) -> Arrays:
     return {"record": np.array([json.dumps(record) for record in records])}
 
 
-def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
+def measured_cases(job: Cases, pool: Executor | None, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
     """Rows and computing times (s) of all cases; cases that an earlier, interrupted run finished are read, not measured
     again.
 
@@ -114,7 +114,9 @@ def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None],
     """
 
     def lost(cases: range, reason: str) -> Arrays:
-        return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
+        return _array_of_record(
+            [{"rows": [_row_of_failed_case(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases]
+        )
 
     store, blocks = (
         job.folder / FINISHED_CASES / ("alone" if alone else "together"),
@@ -128,9 +130,9 @@ def measured(job: Cases, pool: Executor | None, progress: Callable[[int], None],
     }
 
 
-def _broken(name: str, reason: str) -> Row:
+def _row_of_failed_case(name: str, reason: str) -> Row:
     """Failed row of a case that gave no rows."""
-    return failed(f"{name}.broken", f"case {name}", reason)
+    return failed_row(f"{name}.broken", f"case {name}", reason)
 
 
 def validate(
@@ -148,23 +150,29 @@ def validate(
     """
     start, begun = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
-    with locked(folder), (crew or Crew.given()).at_work(len(CASES), folder) as pool:
-        outcomes = _outcomes(pool, quick, folder)
+    with exclusive_folder(folder), (crew or Crew.given()).at_work(len(CASES), folder) as pool:
+        outcomes = _outcomes_of_cases(pool, quick, folder)
         rows = [row for name in CASES for row in outcomes[name][0]]
         seconds = {name: outcomes[name][1] for name in CASES}
         wall = None if resumed else time.perf_counter() - start
-        source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data()}
+        source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data_text()}
         save(
             folder,
             rows,
-            {**source, "seeds": _value_from_pool(pool, seeds), "quick": quick, "seconds": seconds, "wall": wall},
+            {
+                **source,
+                "seeds": _value_from_pool(pool, seeds_of_rows),
+                "quick": quick,
+                "seconds": seconds,
+                "wall": wall,
+            },
             earlier_report,
         )
         path = _write_report(pool, folder)
     return say(rows, time.perf_counter() - start, path)
 
 
-def _data() -> str:
+def _data_text() -> str:
     """Text on the number and size of the measured files that are available."""
     folder = data_folder()
     if folder is None:
@@ -173,7 +181,7 @@ def _data() -> str:
     return f"{len(sizes)} measured files of {sum(sizes) / 1e6:.3g} MB, in the folder that TWINRIG_DATA names"
 
 
-def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
+def _outcomes_of_cases(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
     """Rows and computing time of every case; cases that may run in parallel come first, then those that need the
     machine alone."""
     from rich.console import Console
@@ -184,8 +192,8 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("validate", total=len(CASES))
         here = folder.resolve()
-        first = measured(Cases(together, quick, here), pool, lambda done: bar.update(task, completed=done))
-        return first | measured(
+        first = measured_cases(Cases(together, quick, here), pool, lambda done: bar.update(task, completed=done))
+        return first | measured_cases(
             Cases(alone, quick, here), pool, lambda done: bar.update(task, completed=len(together) + done), alone=True
         )
 
@@ -193,7 +201,7 @@ def _outcomes(pool: Executor | None, quick: bool, folder: Path) -> Outcomes:
 def _last_duration(name: str) -> float:
     """Computing time (s) of a case in the last full report, infinite if unknown; cases that take longest are started
     first."""
-    return float(full()[name]["seconds"]) if name in full() else math.inf
+    return float(full_report_data()[name]["seconds"]) if name in full_report_data() else math.inf
 
 
 def _value_from_pool(pool: Executor | None, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -219,9 +227,9 @@ def _write_report(pool: Executor | None, folder: Path) -> Path:
         return write(folder)
 
 
-def seeds() -> dict[str, int]:
+def seeds_of_rows() -> dict[str, int]:
     """All seeds on which rows depend; with equal seeds and versions all counts and states repeat exactly."""
-    modules = {name: import_module(name) for name in (*(f"validation.cases.{case}" for case in CASES), *SEEDED)}
+    modules = {name: import_module(name) for name in (*(f"validation.cases.{case}" for case in CASES), *SEEDED_MODULES)}
     drawn = {name.rpartition(".")[2].replace("_", " "): module for name, module in modules.items()}
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
@@ -231,8 +239,8 @@ def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | N
     table = [row.as_dict() for row in rows]
     content: Saved = {"provenance": source, "rows": table}
     if earlier_report is not None:
-        content["against"] = against(earlier_report, table, source)
-        print("\n".join(lines(content["against"])))
+        content["against"] = comparison_with_earlier(earlier_report, table, source)
+        print("\n".join(change_lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
     with whole_file(folder / "results.csv") as part, part.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(Row.__dataclass_fields__))

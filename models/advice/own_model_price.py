@@ -13,26 +13,26 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.advice.price import PricedRun, SettingLadder
-from models.advice.price.meshed import chosen
+from models.advice.price.meshed import checked_quantity
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, recommend
 from models.core.errors import InputError, RunFailed
 from models.engines.catalogue import CATALOGUE
 from models.own_model.builds import plain_tree
-from models.own_model.path import DURATION, LARGEST, file_path
+from models.own_model.path import LARGEST_STATE, PATH_DURATION, file_path
 from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
 ALL_COORDINATES = "all"
 """The quantity of all coordinates together."""
 STEPS_PER_SECOND = (40, 50, 80, 100, 160, 200, 250, 400, 500, 800, 1000, 1600, 2000, 4000, 8000, 16000, 32000)
-STEPS = tuple(1.0 / n for n in STEPS_PER_SECOND)
+TRIED_STEPS = tuple(1.0 / n for n in STEPS_PER_SECOND)
 """s: tried by every method."""
-METHODS = {
+METHODS_OF_ENGINE = {
     "exudyn": ("RK44", "RK33", "ExplicitMidpoint", "ExplicitEuler", "GeneralizedAlpha", "TrapezoidalIndex2"),
     "mujoco": ("RK4", "Euler", "implicit", "implicitfast"),
 }
-STAGES = {"RK44": 4, "RK4": 4, "RK33": 3, "ExplicitMidpoint": 2}
+CALLS_PER_STEP = {"RK44": 4, "RK4": 4, "RK33": 3, "ExplicitMidpoint": 2}
 REFERENCE_METHOD, REFERENCE_TOLERANCE = "DOP853", 1e-10
 """Method of another family about the plain equations, and its relative tolerance."""
 USUAL_STEP = 5e-3
@@ -48,7 +48,7 @@ class PricedModel:
     twin: TwinModel
     quantity: str
     where = "in the engine"
-    whole = first = DURATION
+    whole = first = PATH_DURATION
     kink_period = 0.0
     counted = "force calls"
 
@@ -77,8 +77,10 @@ class PricedModel:
     def ladders(self) -> list[SettingLadder]:
         """Ladders of settings for every method; MuJoCo's default step is that of the model's file."""
         return [
-            SettingLadder(engine, method, STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method))
-            for engine, methods in METHODS.items()
+            SettingLadder(
+                engine, method, TRIED_STEPS, CATALOGUE[engine][method].order, default=self._default(engine, method)
+            )
+            for engine, methods in METHODS_OF_ENGINE.items()
             for method in methods
         ]
 
@@ -88,7 +90,7 @@ class PricedModel:
             ("exudyn", "GeneralizedAlpha"): USUAL_STEP,
         }
         wanted = defaults.get((engine, method), 0.0)
-        return min(STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
+        return min(TRIED_STEPS, key=lambda step: abs(step - wanted)) if wanted else 0.0
 
     def reference(self) -> SettingLadder:
         """Ladder of the reference: halved steps of MuJoCo's RK4, which is the fastest method."""
@@ -104,9 +106,9 @@ class PricedModel:
         """
         steps, (q,), (v,) = round(duration / setting.value), *random_states(self.twin, 1)
         path = self._path(setting, (q, v), steps)
-        if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST):
+        if not (np.isfinite(path).all() and np.abs(path).max() < LARGEST_STATE):
             raise RunFailed(setting.engine, "the motion blows up at this step")
-        calls = steps * STAGES.get(setting.method, 1)
+        calls = steps * CALLS_PER_STEP.get(setting.method, 1)
         return setting.value * np.arange(steps + 1), path, calls
 
     def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
@@ -157,7 +159,7 @@ class PricedModel:
         return [f"exudyn.DynamicSolverType.{setting.method}, steps of {setting.value:g} s"]
 
 
-def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommendation:
+def recommended_settings(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommendation:
     """The cheapest settings of a model that meet a tolerance; InputError for an unknown quantity or an impossible
     tolerance.
     """
@@ -170,17 +172,17 @@ def priced(twin: TwinModel, tolerance: float, quantity: str | None) -> Recommend
     if not places:
         raise InputError(twin.name, "", None, "has no hinge and no slide whose coordinate could be held to a tolerance")
     return recommend(
-        PricedModel(twin, chosen(quantity or ALL_COORDINATES, {ALL_COORDINATES: None, **places})), tolerance
+        PricedModel(twin, checked_quantity(quantity or ALL_COORDINATES, {ALL_COORDINATES: None, **places})), tolerance
     )
 
 
 def named_coordinates(twin: TwinModel) -> dict[str, int]:
     """Indices of the coordinates that MuJoCo has as well, by the names of their joints."""
     names, angles = twin.names, {turning.first + i for turning in twin.coordinates.turnings for i in range(3)}
-    return {_bare(name): i for i, name in enumerate(names) if i not in angles}
+    return {_joint_name(name): i for i, name in enumerate(names) if i not in angles}
 
 
-def _bare(name: str) -> str:
+def _joint_name(name: str) -> str:
     """Name of a joint as a user types it, without its type."""
     return name.removeprefix("joint ").replace("'", "")
 

@@ -15,7 +15,7 @@ from models.bicycle.whipple import Whipple
 from models.vehicles.spatial import Body, SpatialVehicle
 
 X, Y, YAW, HEIGHT, LEAN, PITCH, REAR, STEER, FRONT = range(COUNT := 9)
-FALLEN = 1.4
+FALLEN_LEAN = 1.4
 """rad of lean at which a run ends: the bicycle lies on the ground."""
 
 
@@ -66,7 +66,7 @@ def four_bodies(b: Whipple) -> SpatialVehicle:
     return SpatialVehicle("bicycle", bodies, (), (), (), gravity=b.gravity)
 
 
-def straight(b: Whipple, speed: float, lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def straight_rolling(b: Whipple, speed: float, lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions and rates (9,) of rolling straight and upright at a speed (m/s), with a lean rate (rad/s) about the
     line of the contacts."""
     q, v = np.zeros(COUNT), np.zeros(COUNT)

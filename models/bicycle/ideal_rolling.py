@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from models.bicycle.four_bodies import (
     COUNT,
-    FALLEN,
+    FALLEN_LEAN,
     FRONT,
     HEIGHT,
     LEAN,
@@ -24,21 +24,21 @@ from models.bicycle.four_bodies import (
     Y,
     four_bodies,
 )
-from models.bicycle.whipple import UNCONTROLLED, Control, Whipple
+from models.bicycle.whipple import NO_CONTROL, Control, Whipple
 from models.core.errors import RunFailed
 from models.multibody.plain.motion import FIRST, PLACE, RATE, REST, Bodies, PlainMotion
 
-FREE_RATES, OTHERS = [LEAN, STEER, REAR], [X, Y, YAW, HEIGHT, PITCH, FRONT]
-UP = np.array([0.0, 0.0, 1.0])
+FREE_RATES, DEPENDENT_RATES = [LEAN, STEER, REAR], [X, Y, YAW, HEIGHT, PITCH, FRONT]
+UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 class IdealBicycle:
     """The bicycle as four bodies whose wheels roll ideally; raises the same errors as ``Whipple``."""
 
-    def __init__(self, bicycle: Whipple, control: Control = UNCONTROLLED) -> None:
+    def __init__(self, bicycle: Whipple, control: Control = NO_CONTROL) -> None:
         vehicle = four_bodies(bicycle)
         self.bicycle, self.control, self.bodies = bicycle, control, Bodies(vehicle)
-        self.gravity = -bicycle.gravity * UP
+        self.gravity = -bicycle.gravity * UPWARD
         self._masses = np.array([body.mass for body in vehicle.bodies])
         wheels = {"rear wheel": bicycle.rear_wheel.radius, "front wheel": bicycle.front_wheel.radius}
         self._wheels = [(self.bodies.row[name], radius) for name, radius in wheels.items()]
@@ -46,7 +46,7 @@ class IdealBicycle:
     def contacts(self, motion: PlainMotion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Kinematics of both contacts: their heights (2,) m, the Jacobian (6, 9) of the velocities of the material
         points there, and the part (6,) of these points' accelerations without dv/dt."""
-        each = [_contact(motion.matrices[row], radius) for row, radius in self._wheels]
+        each = [_wheel_contact(motion.matrices[row], radius) for row, radius in self._wheels]
         heights, jacobians, rates = zip(*each, strict=True)
         return np.array(heights), np.vstack(jacobians), np.concatenate(rates)
 
@@ -55,7 +55,7 @@ class IdealBicycle:
         contact = self.contacts(self.bodies.move(q, np.zeros(COUNT)))[1]
         N = np.zeros((COUNT, 3))
         N[FREE_RATES] = np.eye(3)
-        N[OTHERS] = -np.linalg.solve(contact[:, OTHERS], contact[:, FREE_RATES])
+        N[DEPENDENT_RATES] = -np.linalg.solve(contact[:, DEPENDENT_RATES], contact[:, FREE_RATES])
         return N, N @ u
 
     def rates(self, time: float, state: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ class IdealBicycle:
         q, (N, v) = state[:COUNT], self.rolling(state[:COUNT], state[COUNT:])
         motion, bias = self.bodies.move(q, v), np.zeros(COUNT)
         _, contact, without = self.contacts(motion)
-        bias[OTHERS] = -np.linalg.solve(contact[:, OTHERS], without)
+        bias[DEPENDENT_RATES] = -np.linalg.solve(contact[:, DEPENDENT_RATES], without)
         mass, force = self.bodies.inertia(motion, self.gravity)
         return np.concatenate([v, np.linalg.solve(N.T @ mass @ N, N.T @ (force + self.applied(v) - mass @ bias))])
 
@@ -102,7 +102,7 @@ class IdealBicycle:
         """Integrate from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the ground."""
 
         def lies(time: float, state: np.ndarray) -> float:
-            return FALLEN - abs(state[LEAN])
+            return FALLEN_LEAN - abs(state[LEAN])
 
         lies.terminal = True  # type: ignore[attr-defined]
         times = np.linspace(0.0, duration, rows)
@@ -119,7 +119,7 @@ class IdealBicycle:
         return Ride(times, q, v, energy, work, solution.nfev)
 
 
-def _contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
+def _wheel_contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
     """Height (m) of a wheel's material point at the ground, Jacobian (3, 9) of its velocity, and its acceleration (3,)
     without dv/dt.
 
@@ -129,7 +129,7 @@ def _contact(wheel: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.nd
     axes, moving = wheel[PLACE, :, :3], wheel[RATE, :, :3]
     axle, turning = axes[:, 1], moving[:, 1]
     flat = np.sqrt(1.0 - axle[2] ** 2)
-    down = (axle * axle[2] - UP) / flat
+    down = (axle * axle[2] - UPWARD) / flat
     lowering = (turning * axle[2] + axle * turning[2] + down * axle[2] * turning[2] / flat) / flat
     point, running = radius * axes.T @ down, radius * (moving.T @ down + axes.T @ lowering)
     places = wheel @ np.append(point, 1.0)

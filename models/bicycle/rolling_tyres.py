@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from models.bicycle.four_bodies import COUNT, FRONT, LEAN, PITCH, REAR, STEER, four_bodies
-from models.bicycle.whipple import UNCONTROLLED, Control, Whipple
+from models.bicycle.whipple import NO_CONTROL, Control, Whipple
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
@@ -42,8 +42,8 @@ from models.tyre.bristles import FIRST_FLEXIBILITY, net, shape_factor, tyre_forc
 from models.vehicles.free_vehicle import joints
 from models.vehicles.spatial import SpatialVehicle
 
-WHEELS = 2
-(GAIN, UNTIL, FRICTION, DRY, DRY_RATE, SPEED_GAIN, SPEED_BIAS, CONTROLS) = range(8)
+WHEEL_COUNT = 2
+(GAIN, FEEDBACK_SPEED_LIMIT, FRICTION, DRY_FRICTION, DRY_RATE, SPEED_GAIN, SPEED_BIAS, CONTROL_COUNT) = range(8)
 """Numbers of the control, gains multiplied."""
 
 
@@ -70,7 +70,7 @@ class RollingBicycle:
 
     bicycle: Whipple
     tyre: BicycleTyre = UNCHANGED_TYRE
-    control: Control = UNCONTROLLED
+    control: Control = NO_CONTROL
     vehicle: SpatialVehicle = field(init=False)
     numbers: np.ndarray = field(init=False)
 
@@ -94,7 +94,7 @@ class RollingBicycle:
     def report(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Reports (n, 2, REPORTED) of the tyres and ledgers (n, LEDGER), columns of ``models.multibody.forces``, at
         positions and rates (n, 9)."""
-        tyres, ledgers = np.empty((len(q), WHEELS, REPORTED)), np.empty((len(q), LEDGER))
+        tyres, ledgers = np.empty((len(q), WHEEL_COUNT, REPORTED)), np.empty((len(q), LEDGER))
         read_bicycle(self.numbers, np.ascontiguousarray(q), np.ascontiguousarray(v), tyres, ledgers)
         return tyres, ledgers
 
@@ -123,14 +123,22 @@ def _table(bicycle: RollingBicycle) -> np.ndarray:
     ends = forces.HEADER + np.cumsum([section.size for section in flat])
     head = np.zeros(forces.HEADER)
     counted = forces.COUNT, forces.JOINTS, forces.POINTS, forces.TYRES, forces.CELLS, forces.STRIPS, forces.MIDDLE
-    head[[*counted]] = ends[-1], COUNT, WHEELS, WHEELS, patch.cells.shape[1], patch.strips.shape[1], patch.middle
+    head[[*counted]] = (
+        ends[-1],
+        COUNT,
+        WHEEL_COUNT,
+        WHEEL_COUNT,
+        patch.cells.shape[1],
+        patch.strips.shape[1],
+        patch.middle,
+    )
     head[[forces.OF_POINTS, forces.OF_TYRES, forces.OF_KNOTS, forces.OF_CELLS, forces.OF_STRIPS]] = ends[:-1]
     return np.concatenate([head, *flat])
 
 
 def _tyres(bicycle: RollingBicycle) -> np.ndarray:
     """Numbers (2, PER_TYRE) of both tyres, in the columns of a car's tyres, of which the bicycle needs only some."""
-    t, table = bicycle.tyre, np.zeros((WHEELS, forces.PER_TYRE))
+    t, table = bicycle.tyre, np.zeros((WHEEL_COUNT, forces.PER_TYRE))
     vertical, width = t.stiffness**2 * t.vertical, t.half_width / t.stiffness
     wheels = (
         (PITCH, REAR, "rear wheel", bicycle.bicycle.rear_wheel),
@@ -150,7 +158,7 @@ def _tyres(bicycle: RollingBicycle) -> np.ndarray:
 
 
 @lean
-def _touch(tyre, vehicle, wheel):
+def _tyre_load(tyre, vehicle, wheel):
     """Load of a tyre, which acts at the wheel's lowest point; fills the ``WheelContact``."""
     patch, slip, way, report, ledger = wheel.patch, wheel.slip, wheel.way, wheel.report, vehicle.ledger
     spot = row(vehicle.tree.spots, tree.PER_SPOT, int(tyre[forces.POINT]))
@@ -187,14 +195,16 @@ def _touch(tyre, vehicle, wheel):
 
 
 @lean
-def _steer(numbers, vehicle):
+def _add_steering_torque(numbers, vehicle):
     """Add the steering torque (to the left) of control and friction, which depends on the speed of the rear wheel's
     centre."""
     v = vehicle.rates
-    missing = max(numbers[UNTIL] - numbers[SPEED_GAIN] * abs(vehicle.frame.ahead) - numbers[SPEED_BIAS], 0.0)
+    missing = max(
+        numbers[FEEDBACK_SPEED_LIMIT] - numbers[SPEED_GAIN] * abs(vehicle.frame.ahead) - numbers[SPEED_BIAS], 0.0
+    )
     torque = -numbers[GAIN] * missing * v[LEAN] - numbers[FRICTION] * v[STEER]
-    if numbers[DRY] != 0.0:
-        torque -= numbers[DRY] * math.tanh(v[STEER] / numbers[DRY_RATE])
+    if numbers[DRY_FRICTION] != 0.0:
+        torque -= numbers[DRY_FRICTION] * math.tanh(v[STEER] / numbers[DRY_RATE])
     vehicle.forces[STEER] += torque
     vehicle.ledger[STEER_POWER] = torque * v[STEER]
 
@@ -203,27 +213,30 @@ def _steer(numbers, vehicle):
 def all_bicycle_forces(numbers, q, v, f, report, ledger):
     """Add all forces to ``f`` (9,); all are arrays: table, q, v (9,), report (2, REPORTED), ledger (LEDGER,)."""
     vehicle, table = enter(numbers, q, v, f, doubles(room(numbers)), ledger), start(numbers)
-    patches, ways = array(doubles(10 * WHEELS), (WHEELS, 10)), doubles(forces.WAY * WHEELS)
-    slips, creeping = array(doubles(4 * WHEELS), (WHEELS, 4)), array(doubles(4 * WHEELS), (WHEELS, 4))
+    patches, ways = array(doubles(10 * WHEEL_COUNT), (WHEEL_COUNT, 10)), doubles(forces.WAY * WHEEL_COUNT)
+    slips, creeping = (
+        array(doubles(4 * WHEEL_COUNT), (WHEEL_COUNT, 4)),
+        array(doubles(4 * WHEEL_COUNT), (WHEEL_COUNT, 4)),
+    )
     tyres = beyond(table, int(numbers[forces.OF_TYRES]))
-    for i in range(WHEELS):
+    for i in range(WHEEL_COUNT):
         wheel = WheelContact(patches[i], slips[i], row(ways, forces.WAY, i), report[i])
-        _touch(row(tyres, forces.PER_TYRE, i), vehicle, wheel)
+        _tyre_load(row(tyres, forces.PER_TYRE, i), vehicle, wheel)
     cells = array(beyond(table, int(numbers[forces.OF_CELLS])), (5, int(numbers[forces.CELLS])))
     strips = array(beyond(table, int(numbers[forces.OF_STRIPS])), (4, int(numbers[forces.STRIPS])))
     tyre_forces(patches, slips, strips, cells, numbers[forces.MIDDLE], creeping)
-    for i in range(WHEELS):
+    for i in range(WHEEL_COUNT):
         wheel = WheelContact(patches[i], slips[i], row(ways, forces.WAY, i), report[i])
         creep(row(tyres, forces.PER_TYRE, i), creeping[i], vehicle, wheel)
         ledger[DISSIPATED] += report[i, forces.POWER]
-    _steer(numbers[int(numbers[forces.OF_KNOTS]) :], vehicle)
+    _add_steering_torque(numbers[int(numbers[forces.OF_KNOTS]) :], vehicle)
     leave(numbers, vehicle)
 
 
 @lean
 def bicycle_forces(numbers, t, q, v, f):
     """Add the bicycle's forces to ``f``. For callbacks: all arguments but the time (s) are pointers to doubles."""
-    report, ledger = array(doubles(WHEELS * REPORTED), (WHEELS, REPORTED)), array(doubles(LEDGER), (LEDGER,))
+    report, ledger = array(doubles(WHEEL_COUNT * REPORTED), (WHEEL_COUNT, REPORTED)), array(doubles(LEDGER), (LEDGER,))
     table = array(numbers, (int(array(numbers, (forces.HEADER,))[forces.COUNT]),))
     all_bicycle_forces(table, array(q, (COUNT,)), array(v, (COUNT,)), array(f, (COUNT,)), report, ledger)
 

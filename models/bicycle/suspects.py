@@ -13,9 +13,9 @@ from models.bicycle.weave import Observation
 from models.bicycle.whipple import Control, Whipple
 from models.core.errors import InputError
 from models.identification.subsets import Candidate, Choice
-from models.identification.subsets import chosen as chosen_of
+from models.identification.subsets import ranked_subsets as chosen_of
 
-SUSPECTS = {
+SUSPECTED_PARAMETERS = {
     "friction": Candidate(0.1, lowest=0.0),
     "dry_friction": Candidate(0.1, lowest=0.0),
     "torque_gain": Candidate(1.0),
@@ -24,53 +24,56 @@ SUSPECTS = {
     "speed_bias": Candidate(0.0),
 }
 """What experimenters suspect of a bicycle's control, keys of ``Control``."""
-FRICTIONS = {"friction of either kind": ("friction", "dry_friction")}
-UNITS = {"friction": "N m s/rad", "dry_friction": "N m", "speed_bias": "m/s"}
+FRICTION_SETS = {"friction of either kind": ("friction", "dry_friction")}
+UNIT_OF_SUSPECT = {"friction": "N m s/rad", "dry_friction": "N m", "speed_bias": "m/s"}
 NO_WEAVE = -20.0 + 0.0j
 """Stands for a weave (1/s) that does not swing at all."""
 
 
-def predicted(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
+def predicted_weave(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
     """Prediction (3,) of a model at a speed: real and imaginary part of the weave (1/s), and measured speed (m/s)."""
-    weave = bicycle.weave(observation.speed, control.viscous(float(observation.slowness.mean())))
+    weave = bicycle.weave(observation.speed, control.viscous(float(observation.inverse_steer_rate.mean())))
     weave = weave if np.isfinite(weave) else NO_WEAVE
     return np.array([weave.real, weave.imag, control.speed_gain * observation.speed + control.speed_bias])
 
 
-def chosen(
-    bicycle: Whipple, base: Control, observations: Sequence[Observation], suspects: Sequence[str] = tuple(SUSPECTS)
+def ranked_suspects(
+    bicycle: Whipple,
+    base: Control,
+    observations: Sequence[Observation],
+    suspects: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
 ) -> Choice:
     """Fits of every subset of the suspected parameters, ranked; InputError for fewer than two speeds, or an unknown
     name."""
     for name in suspects:
-        if name not in SUSPECTS:
-            raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTS))
+        if name not in SUSPECTED_PARAMETERS:
+            raise InputError("", "suspects", name, "no such suspect", tuple(SUSPECTED_PARAMETERS))
     if len(observations) < 2:
         raise InputError("", "speeds", len(observations), "a choice of suspects needs two speeds or more")
     sensor = _sensor_error(observations)
-    weights = [_whitener(observation, sensor) for observation in observations]
+    weights = [_whitening_matrix(observation, sensor) for observation in observations]
 
     def left(values: dict[str, float]) -> np.ndarray:
         control = base.model_copy(update=values)
         return np.concatenate(
-            [w @ (o.mean - predicted(bicycle, control, o)) for w, o in zip(weights, observations, strict=True)]
+            [w @ (o.mean - predicted_weave(bicycle, control, o)) for w, o in zip(weights, observations, strict=True)]
         )
 
-    return chosen_of(left, {name: SUSPECTS[name] for name in suspects}, FRICTIONS)
+    return chosen_of(left, {name: SUSPECTED_PARAMETERS[name] for name in suspects}, FRICTION_SETS)
 
 
-def forecast(
+def averaged_weave(
     bicycle: Whipple, base: Control, choice: Choice, observation: Observation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Damping and frequency (2,) of the weave, averaged over all subsets with their weights, and their standard
     deviations (2,)."""
-    return choice.forecast(lambda values: predicted(bicycle, base.model_copy(update=values), observation)[:2])
+    return choice.forecast(lambda values: predicted_weave(bicycle, base.model_copy(update=values), observation)[:2])
 
 
-def deviations(bicycle: Whipple, base: Control, choice: Choice, observation: Observation) -> np.ndarray:
+def forecast_deviations(bicycle: Whipple, base: Control, choice: Choice, observation: Observation) -> np.ndarray:
     """Forecast less measured damping and frequency (2,), divided by the standard deviation of measurement and forecast
     together."""
-    mean, deviation = forecast(bicycle, base, choice, observation)
+    mean, deviation = averaged_weave(bicycle, base, choice, observation)
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
@@ -84,7 +87,7 @@ def _sensor_error(observations: Sequence[Observation]) -> float:
     return float(np.sqrt(np.sum(left**2) / (len(observations) - 2)))
 
 
-def _whitener(observation: Observation, sensor: float) -> np.ndarray:
+def _whitening_matrix(observation: Observation, sensor: float) -> np.ndarray:
     """Matrix (3, 3) that maps deviations to independent standard normal ones; the error of the speed sensor counts as
     independent."""
     covariance = np.zeros((3, 3))

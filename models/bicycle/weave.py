@@ -14,27 +14,27 @@ from scipy.optimize import least_squares
 
 from models.core.errors import InputError
 
-RATE = 100.0
+SAMPLING_RATE = 100.0
 """Samples per second."""
 SHORTEST_WINDOW = 20
 """Samples of a window."""
-STARTS = [(decay, frequency) for decay in (-1.0, -3.0, -6.0) for frequency in (4.0, 7.0, 10.0)]
+FIT_STARTS = [(decay, frequency) for decay in (-1.0, -3.0, -6.0) for frequency in (4.0, 7.0, 10.0)]
 """Where fits begin (1/s, rad/s)."""
-HEADINGS = ("lean_rate", "fork_rate", "speed")
+COLUMN_HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
     """Measurements in windows (n,) at one speed (m/s) of the treadmill.
 
-    weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); slowness : mean of |steer rate| by mean
-    of its square (s/rad), by which dry friction is worth a viscous one.
+    weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); inverse_steer_rate : mean of |steer
+    rate| by mean of its square (s/rad), by which dry friction is worth a viscous one.
     """
 
     speed: float
     weave: np.ndarray
     measured_speed: np.ndarray
-    slowness: np.ndarray
+    inverse_steer_rate: np.ndarray
 
     @property
     def parts(self) -> np.ndarray:
@@ -52,7 +52,7 @@ class Observation:
         return self.parts.std(axis=0, ddof=1)
 
 
-def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
+def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> complex:
     """Eigenvalue s + i w (1/s) of the function e^{s t} (a cos w t + b sin w t) + c fitted to samples (n,) by least
     squares; w is above 0."""
     times = np.arange(len(values)) / rate
@@ -64,21 +64,23 @@ def decaying_sinusoid(values: np.ndarray, rate: float = RATE) -> complex:
         )
         return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0])
 
-    best = min((least_squares(left, start, x_scale=(1.0, 3.0)) for start in STARTS), key=lambda fit: float(fit.cost))
+    best = min(
+        (least_squares(left, start, x_scale=(1.0, 3.0)) for start in FIT_STARTS), key=lambda fit: float(fit.cost)
+    )
     return complex(best.x[0], abs(best.x[1]))
 
 
 def observations(folder: str | Path) -> list[Observation]:
     """Observations of a folder by ascending speed; InputError with file, position and value where it cannot be read."""
-    folder, rows = Path(folder), _windows(Path(folder) / "windows.csv")
-    recordings = {label: _recording(folder, label) for label in {row[0] for row in rows}}
+    folder, rows = Path(folder), _rows_of_windows(Path(folder) / "windows.csv")
+    recordings = {label: _columns_of_recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
     for line, (label, speed, first, last) in enumerate(rows, 2):
         recording = recordings[label]
         if last >= len(recording["speed"]):
             allowed = f"the recording has {len(recording['speed'])} samples"
             raise InputError(folder / "windows.csv", f"line {line}, last sample", last, allowed)
-        lean, steer, sensor = (recording[name][first : last + 1] for name in HEADINGS)
+        lean, steer, sensor = (recording[name][first : last + 1] for name in COLUMN_HEADINGS)
         if not np.isfinite([lean, steer, sensor]).all() or not np.any(steer) or np.ptp(lean) == 0.0:
             raise InputError(folder / "windows.csv", f"line {line}", first, "gaps, or no motion, in this window")
         slowness = np.abs(steer).mean() / np.mean(steer**2)
@@ -90,7 +92,7 @@ def observations(folder: str | Path) -> list[Observation]:
     return [Observation(speed, *map(np.array, zip(*by_speed[speed], strict=True))) for speed in sorted(by_speed)]
 
 
-def _windows(path: Path) -> list[tuple[str, float, int, int]]:
+def _rows_of_windows(path: Path) -> list[tuple[str, float, int, int]]:
     """Rows of the file windows.csv."""
     if not path.is_file():
         raise InputError(path, "", None, "no such file: it lists file, speed [m/s], first and last sample")
@@ -110,7 +112,7 @@ def _windows(path: Path) -> list[tuple[str, float, int, int]]:
     return rows
 
 
-def _recording(folder: Path, label: str) -> dict[str, np.ndarray]:
+def _columns_of_recording(folder: Path, label: str) -> dict[str, np.ndarray]:
     """Columns of the recording with a given label."""
     paths = sorted(path for path in folder.glob("*.csv*") if path.name.partition(".csv")[0].endswith(f"_{label}kph"))
     if len(paths) != 1:
@@ -118,7 +120,7 @@ def _recording(folder: Path, label: str) -> dict[str, np.ndarray]:
         raise InputError(folder / "windows.csv", "file [km/h]", label, allowed)
     table = np.genfromtxt(paths[0], delimiter=",", names=True, invalid_raise=False)
     names: Iterable[str] = table.dtype.names or ()
-    for name in HEADINGS:
+    for name in COLUMN_HEADINGS:
         if name not in names:
             raise InputError(paths[0], "header", None, f"has no column {name!r}", tuple(names))
-    return {name: np.atleast_1d(table[name]) for name in HEADINGS}
+    return {name: np.atleast_1d(table[name]) for name in COLUMN_HEADINGS}

@@ -20,10 +20,10 @@ from models.core.errors import InputError
 from models.core.scene_file import existing, parse
 from models.core.strict import Strict, quantity, read
 
-SETS = Path(__file__).parents[1] / "vehicles" / "parameters" / "bicycles"
+PARAMETER_SET_FOLDER = Path(__file__).parents[1] / "vehicles" / "parameters" / "bicycles"
 LARGEST_TILT = 1.5
 """rad of the steering axis."""
-MEASURED = 1.05
+MEASURED_INERTIA_FACTOR = 1.05
 """By how much a measured inertia may be beyond what a rigid body can have."""
 HIGHEST_SPEED = 100.0
 """m/s"""
@@ -39,8 +39,11 @@ class Wheel(Strict):
 
     @model_validator(mode="after")
     def _possible(self) -> "Wheel":
-        if self.Iyy > MEASURED * 2.0 * self.Ixx:
-            allowed = f"must be at most 2 Ixx = {2.0 * self.Ixx:g} kg m^2, {MEASURED - 1.0:.0%} for measuring apart"
+        if self.Iyy > MEASURED_INERTIA_FACTOR * 2.0 * self.Ixx:
+            allowed = (
+                f"must be at most 2 Ixx = {2.0 * self.Ixx:g} kg m^2, {MEASURED_INERTIA_FACTOR - 1.0:.0%} "
+                "for measuring apart"
+            )
             raise ValueError(f"Iyy {allowed}: no wheel has more about its axle")
         return self
 
@@ -60,7 +63,7 @@ class Frame(Strict):
     def _possible(self) -> "Frame":
         if self.Ixz**2 > self.Ixx * self.Izz * (1.0 + 1e-9):
             raise ValueError(f"Ixz must be at most {np.sqrt(self.Ixx * self.Izz):g} kg m^2, the root of Ixx Izz")
-        if self.Iyy is not None and self.Iyy > MEASURED * (self.Ixx + self.Izz):
+        if self.Iyy is not None and self.Iyy > MEASURED_INERTIA_FACTOR * (self.Ixx + self.Izz):
             raise ValueError(f"Iyy must be at most Ixx + Izz = {self.Ixx + self.Izz:g} kg m^2")
         return self
 
@@ -104,7 +107,7 @@ class Control(Strict):
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
 
 
-UNCONTROLLED = Control()
+NO_CONTROL = Control()
 """No control, no friction."""
 
 
@@ -170,7 +173,7 @@ class Whipple(Strict):
         K2 = np.array([[0.0, (ST - mass * zT) * cosine / w], [0.0, (SA + SF * sine) * cosine / w]])
         return LinearBicycle(M, C1, K0, K2)
 
-    def state_matrix(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
+    def state_matrix(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
         """State matrix (4, 4) of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
@@ -178,13 +181,13 @@ class Whipple(Strict):
         below = np.linalg.solve(M, -np.hstack([stiffness, damping]))
         return np.vstack([np.eye(2, 4, 2), below])
 
-    def eigenvalues(self, speed: float, control: Control = UNCONTROLLED) -> np.ndarray:
+    def eigenvalues(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
         """Eigenvalues (4,) in 1/s at a speed (m/s), sorted by real, then imaginary part."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
-    def weave(self, speed: float, control: Control = UNCONTROLLED) -> complex:
+    def weave(self, speed: float, control: Control = NO_CONTROL) -> complex:
         """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster of two; NaN if
         there is none."""
         values = self.eigenvalues(speed, control)
@@ -203,7 +206,7 @@ class Whipple(Strict):
                 Polynomial(M[i, j]),
             ]
 
-        one, two = _product(entry(0, 0), entry(1, 1)), _product(entry(0, 1), entry(1, 0))
+        one, two = _product_of_quadratics(entry(0, 0), entry(1, 1)), _product_of_quadratics(entry(0, 1), entry(1, 0))
         return [a - b for a, b in zip(one, two, strict=True)]
 
     @property
@@ -223,7 +226,7 @@ class Whipple(Strict):
         return roots[-1] if roots else None
 
 
-def _product(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
+def _product_of_quadratics(one: list[Polynomial], two: list[Polynomial]) -> list[Polynomial]:
     """Coefficients of the product of two quadratics in s."""
     total = [Polynomial([0.0]) for _ in range(5)]
     for i, a in enumerate(one):
@@ -246,7 +249,7 @@ def _positive_roots(condition: Polynomial) -> list[float]:
 def load_bicycle(name: str, folder: str | Path = ".", file: str = "", place: str = "bicycle") -> Whipple:
     """The parameter set with this name, or in a TOML file with all parameters; ``file`` and ``place`` name the asking
     scene in messages."""
-    sets = {path.stem: path for path in sorted(SETS.glob("*.toml"))}
+    sets = {path.stem: path for path in sorted(PARAMETER_SET_FOLDER.glob("*.toml"))}
     if name not in sets and not name.endswith(".toml"):
         raise InputError(file, place, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets))
     path = sets.get(name) or existing(name, Path(folder), file, place)

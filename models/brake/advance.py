@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from models.brake.plane_chain import ChainPoint, Direction, rows
+from models.brake.plane_chain import ChainPoint, Direction, fill_velocity_rows
 from models.brake.plane_records import PlaneMotion, Report, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
@@ -12,7 +12,7 @@ from models.brake.surfaces import is_uniform, surfaces_of, under_wheels
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
-FINE, AT_REST, NOT_FOUND, PITCHED, ROLLED, FOLDED = range(6)
+FINE, AT_REST, NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED = range(6)
 """How a sample ended: still moving; standing; loads not found; an axle without load; both wheels of a side without
 load; a hinge of the train beyond its limit."""
 
@@ -21,7 +21,7 @@ MOST_PARTS = 64
 
 
 @inlined
-def ended(motion, plane):
+def end_status(motion, plane):
     """FINE, or the way in which a step ends the run. It is read from wheel loads and hinge angles of units with two
     axles.
 
@@ -32,11 +32,11 @@ def ended(motion, plane):
         a, b = load[first] > 0.0, load[first + 1] > 0.0
         c, d = load[first + 2] > 0.0, load[first + 3] > 0.0
         if not (a or b) or not (c or d):
-            status = PITCHED
+            status = PITCHED_OVER
         elif not (a or c) or not (b or d):
-            status = ROLLED
+            status = ROLLED_OVER
     for k in range(1, plane.masses.size):
-        if abs(headings[k] - headings[k - 1]) > plane.fold:
+        if abs(headings[k] - headings[k - 1]) > plane.jackknife_angle:
             status = FOLDED
     return status
 
@@ -103,37 +103,37 @@ def advance(motion, torques, step, steer, vehicle):
         time += used
         if used < step:
             return AT_REST, time
-        status = ended(motion, vehicle.plane)
+        status = end_status(motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time
 
 
-ENDS = (NOT_FOUND, PITCHED, ROLLED, FOLDED)
+FATAL_ENDS = (NOT_FOUND, PITCHED_OVER, ROLLED_OVER, FOLDED)
 """Ends of a sample after which a run cannot go on."""
-BODIES = ("vehicle", "trailer")
-HINGES = ("the drawbar against the truck", "the trailer's body against the drawbar")
+BODY_NAMES = ("vehicle", "trailer")
+HINGE_NAMES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
-def ending(status: int, plane: Plane, motion: PlaneMotion) -> str:
+def ending_sentence(status: int, plane: Plane, motion: PlaneMotion) -> str:
     """Sentence on why a run ended, from the status and the motion of its last step."""
     if status == FOLDED:
-        return _folded(plane, motion.state[0, 2:])
+        return _folded_sentence(plane, motion.state[0, 2:])
     if status == NOT_FOUND:
         return "no loads were found"
     loads = Report(*motion.report).load
-    first = next(i for i in range(0, plane.wheels, 4) if _lifted(loads[i : i + 4]))
-    return _tipped(status, plane, slice(first, first + 4), _acceleration(plane, first, motion), loads)
+    first = next(i for i in range(0, plane.wheels, 4) if _side_or_axle_lifted(loads[i : i + 4]))
+    return _tipping_sentence(status, plane, slice(first, first + 4), _acceleration(plane, first, motion), loads)
 
 
-def _folded(plane: Plane, headings: np.ndarray) -> str:
+def _folded_sentence(plane: Plane, headings: np.ndarray) -> str:
     angles = np.degrees(np.diff(headings))
     k = int(np.argmax(np.abs(angles)))
-    hinge = HINGES[k] if angles.size > 1 else HINGES[1]
-    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {math.degrees(plane.fold):g} deg"
+    hinge = HINGE_NAMES[k] if angles.size > 1 else HINGE_NAMES[1]
+    return f"the train jackknifes: {hinge} at {angles[k]:.1f} deg, limit {math.degrees(plane.jackknife_angle):g} deg"
 
 
-def _lifted(loads: np.ndarray) -> bool:
+def _side_or_axle_lifted(loads: np.ndarray) -> bool:
     """Whether both wheels of a side, or both wheels of an axle, carry no load."""
     up = loads <= 0.0
     return bool((up[0] or up[3]) and (up[1] or up[2]))
@@ -144,16 +144,18 @@ def _acceleration(plane: Plane, first: int, motion: PlaneMotion) -> tuple[float,
     accelerations = motion.accelerations
     k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
-    ahead, aside = rows(ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across)
+    ahead, aside = fill_velocity_rows(
+        ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across
+    )
     return float(along @ accelerations + ahead), float(across @ accelerations + aside)
 
 
-def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
+def _tipping_sentence(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:
     """Sentence on how a vehicle tips over, from moments about the wheels that stay on the road; the statics are those
     of a body whose wheel loads follow its accelerations."""
-    body, (ahead, aside) = BODIES[four.start // 4], rates
+    body, (ahead, aside) = BODY_NAMES[four.start // 4], rates
     static, by_x, by_y, y = (part[four] for part in (plane.static, plane.by_x, plane.by_y, plane.place[:, 1]))
-    if status == PITCHED:
+    if status == PITCHED_OVER:
         axle = 0 if loads[four][:2].max() <= 0.0 else 2
         limit = -static[axle : axle + 2].sum() / by_x[axle : axle + 2].sum()
         return (

@@ -26,7 +26,7 @@ class Brake(Strict):
     falling: float = quantity("N m/bar", "gradient of the torque while pressure falls; at least rising")
 
     @model_validator(mode="after")
-    def _a_loop(self) -> "Brake":
+    def _is_a_loop(self) -> "Brake":
         if self.release > self.push_out:
             raise ValueError(f"release must be at most push_out, {self.push_out:g} bar: brakes let go below that")
         if self.falling < self.rising:
@@ -57,7 +57,7 @@ def torque(i, pressure, before, brakes):
     return max(up, min(down, before))
 
 
-def torques(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
+def torques_of_pressures(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
     """Torques (n,) in N m of the first brake over a sequence of pressures (n,) in bar; it starts without torque."""
     before, along = 0.0, np.empty(len(pressures))
     for n, pressure in enumerate(pressures):

@@ -11,12 +11,12 @@ import numpy as np
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import InputError
 
-KMH = 1.0 / 3.6
+METRES_PER_SECOND_OF_KMH = 1.0 / 3.6
 """m/s of a kilometre per hour."""
 NOT_CHECKED = "not checked against the text of the regulation"
 ROLLING_DRIVEN, ROLLING_FREE = 0.015, 0.010
 """Rolling resistance by load that Annex 13 takes for an axle without brake: of a driven and of an undriven one."""
-UTILISED = 0.75
+LEAST_UTILISATION = 0.75
 """Least adhesion utilisation of a category 1 system."""
 
 
@@ -35,13 +35,13 @@ class Axles:
         """Weight of the vehicle (N)."""
         return self.front + self.rear
 
-    def dynamic(self, z: float) -> tuple[float, float]:
+    def dynamic_loads(self, z: float) -> tuple[float, float]:
         """Loads (N) of the front and the rear axle when the vehicle decelerates at z g."""
         moved = self.height / self.wheelbase * z * self.weight
         return self.front + moved, self.rear - moved
 
 
-def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
+def crossing_time(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
     """Time (s) at which the speed first falls below ``speed``, interpolated linearly between samples; NaN if it never
     does."""
     below = np.flatnonzero(speeds < speed)
@@ -69,7 +69,7 @@ def mean_fully_developed(times: np.ndarray, distance: np.ndarray, speeds: np.nda
     the regulation. Not a number if the vehicle does not get so slow.
     """
     high, low = 0.8 * speeds[0], 0.1 * speeds[0]
-    begin, end = (crossing(times, speeds, speed) for speed in (high, low))
+    begin, end = (crossing_time(times, speeds, speed) for speed in (high, low))
     if not np.isfinite(begin + end):
         return float("nan")
     covered = way_at(times, distance, speeds, end) - way_at(times, distance, speeds, begin)
@@ -105,7 +105,7 @@ def adhesion_front(z: float, axles: Axles) -> float:
 
     (z P g - 0.015 F2) / (F1 + (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
-    return round((z * axles.weight - ROLLING_DRIVEN * axles.rear) / axles.dynamic(z)[0], 3)
+    return round((z * axles.weight - ROLLING_DRIVEN * axles.rear) / axles.dynamic_loads(z)[0], 3)
 
 
 def adhesion_rear(z: float, axles: Axles) -> float:
@@ -113,7 +113,7 @@ def adhesion_rear(z: float, axles: Axles) -> float:
 
     (z P g - 0.010 F1) / (F2 - (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
-    return round((z * axles.weight - ROLLING_FREE * axles.front) / axles.dynamic(z)[1], 3)
+    return round((z * axles.weight - ROLLING_FREE * axles.front) / axles.dynamic_loads(z)[1], 3)
 
 
 def adhesion_trailer(z: float, weight: float, load: float) -> float:
@@ -134,7 +134,7 @@ def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -
 
     Source: UN R13, Annex 13; not checked against the text of the regulation.
     """
-    front, rear = axles.dynamic(z)
+    front, rear = axles.dynamic_loads(z)
     return (k_front * front + k_rear * rear) / axles.weight
 
 
@@ -143,7 +143,7 @@ def split_rate(k_low: float, k_high: float) -> float:
 
     Source: UN R13, Annex 13, laden vehicles of category 1; not checked against the text of the regulation.
     """
-    return max(UTILISED * (4.0 * k_low + k_high) / 5.0, k_low)
+    return max(LEAST_UTILISATION * (4.0 * k_low + k_high) / 5.0, k_low)
 
 
 def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
@@ -162,10 +162,12 @@ class Locks:
 
     time: np.ndarray
     share: np.ndarray
-    longest: np.ndarray
+    longest_lock: np.ndarray
 
 
-def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, least_speed: float = 15.0 * KMH) -> Locks:
+def lock_table(
+    lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, least_speed: float = 15.0 * METRES_PER_SECOND_OF_KMH
+) -> Locks:
     """Locked times of the wheels while the vehicle is above a speed (m/s). lengths (n,): durations of the samples (s);
     locked (n, W): whether a wheel is locked; speeds (n,): of the vehicle (m/s).
 

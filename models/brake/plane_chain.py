@@ -64,22 +64,22 @@ def coordinates(plane):
 
 
 @inlined
-def prescribed(plane):
+def count_of_prescribed(plane):
     """Number of coordinates with a prescribed motion; they are the first ones: two at a hook, else none."""
-    return 0 if len(plane.units) == 1 else 2 * plane.hooked
+    return 0 if len(plane.units) == 1 else 2 * plane.has_prescribed_hook
 
 
 @inlined
-def headings(positions, units):
+def fill_headings(positions, units):
     """Fill the cosine and the sine of the heading of every unit (U, 2)."""
     for j in range(units.shape[0]):
         units[j, 0], units[j, 1] = math.cos(positions[2 + j]), math.sin(positions[2 + j])
 
 
 @inlined
-def rows(point, direction, units, rates, plane, along, across):
+def fill_velocity_rows(point, direction, units, rates, plane, along, across):
     """Fill the two rows (n,) that map the coordinates' rates to the velocity of a ``ChainPoint`` along a ``Direction``
-    and to the left of it; ``units`` : see ``headings``.
+    and to the left of it; ``units`` : see ``fill_headings``.
 
     The point's acceleration is the rows times the coordinates' accelerations, plus the two terms returned (m/s^2). A
     force in these axes gives generalised forces by the transposed rows.
@@ -103,12 +103,12 @@ def inertia(units, rates, plane, mass, right, along, across):
     """Fill the mass matrix (n, n), and ``right`` (n,) with the centrifugal terms, which stand beside the forces in the
     equations.
 
-    units : see ``headings``; along, across (n,) : room to work in.
+    units : see ``fill_headings``; along, across (n,) : room to work in.
     """
     size = coordinates(plane)
     mass[:], right[:] = 0.0, 0.0
     for k in range(len(plane.units)):
-        ahead, aside = rows(ChainPoint(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
+        ahead, aside = fill_velocity_rows(ChainPoint(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
         for a in range(size):
             right[a] -= plane.masses[k] * (along[a] * ahead + across[a] * aside)
             for b in range(size):
@@ -117,12 +117,12 @@ def inertia(units, rates, plane, mass, right, along, across):
 
 
 @inlined
-def factor(mass, plane):
+def factorise_mass(mass, plane):
     """Replace the lower triangle of the mass matrix of the free coordinates by its Cholesky factor. A single unit's
     matrix is diagonal and stays as it is."""
     if len(plane.units) == 1:
         return
-    first = prescribed(plane)
+    first = count_of_prescribed(plane)
     for a in range(first, mass.shape[0]):
         for b in range(first, a + 1):
             rest = mass[a, b]
@@ -134,8 +134,8 @@ def factor(mass, plane):
 @inlined
 def solve(mass, plane, right):
     """Turn forces (n,) in ``right`` into accelerations of the free coordinates, in place, with the matrix from
-    ``factor``."""
-    size, first = coordinates(plane), prescribed(plane)
+    ``factorise_mass``."""
+    size, first = coordinates(plane), count_of_prescribed(plane)
     if len(plane.units) == 1:
         for a in range(size):
             right[a] /= mass[a, a]

@@ -28,9 +28,9 @@ class Report(NamedTuple):
     turning: np.ndarray
 
 
-REPORTED = len(Report._fields)
+REPORT_SIZE = len(Report._fields)
 """Numbers that a wheel reports."""
-TURNING = Report._fields.index("turning")
+TURNING_ROW = Report._fields.index("turning")
 """The row of the speeds of turning, for what runs in Python as well: there ``report_of`` gives no ``Report``."""
 
 
@@ -55,7 +55,7 @@ class PlaneMotion(NamedTuple):
 
 def motion_of(state: np.ndarray, turning: np.ndarray) -> PlaneMotion:
     """A ``PlaneMotion`` with zero accelerations and an empty report, from positions and rates, and wheel rotation."""
-    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
+    return PlaneMotion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORT_SIZE, turning.size)))
 
 
 class Wheels(NamedTuple):
@@ -63,8 +63,8 @@ class Wheels(NamedTuple):
 
     start : speed of its centre along it at the start (m/s); rate : what that one's rate has besides the accelerations
     of the coordinates (m/s^2); along, aside : speeds of its centre along it, from 0 on, and across it where slip angles
-    are taken; angle : slip angle (rad); cell, share : where that lies in the tables; still : load (N) besides what
-    accelerations move, load : with that; cosine, sine : of the angle by which it is steered.
+    are taken; angle : slip angle (rad); cell, share : where that lies in the tables; static_load : load (N) besides
+    what accelerations move, load : with that; cosine, sine : of the angle by which it is steered.
     """
 
     start: np.ndarray
@@ -74,7 +74,7 @@ class Wheels(NamedTuple):
     angle: np.ndarray
     cell: np.ndarray
     share: np.ndarray
-    still: np.ndarray
+    static_load: np.ndarray
     load: np.ndarray
     cosine: np.ndarray
     sine: np.ndarray

@@ -2,8 +2,8 @@
 
 A half step gives the state in the middle, and the whole step takes its slip angles, loads and friction there: order
 two. Loads follow from accelerations and these from the tyres' forces under the loads; the whole step finds the fixed
-point to ``CLOSE``. Below ``regular``, the speed at which cornering stiffness is as fast as the step, slip angles are
-those of that speed.
+point to ``ACCELERATION_TOLERANCE``. Below ``regular``, the speed at which cornering stiffness is as fast as the step,
+slip angles are those of that speed.
 """
 
 import math
@@ -12,34 +12,34 @@ from models.brake.plane_chain import (
     ChainPoint,
     Direction,
     coordinates,
-    factor,
-    headings,
+    count_of_prescribed,
+    factorise_mass,
+    fill_headings,
+    fill_velocity_rows,
     inertia,
-    prescribed,
-    rows,
     solve,
 )
 from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
-from models.tyre.tyre_table import Cells, cell_and_share, lateral_adhesion
+from models.tyre.tyre_table import TableCell, cell_and_share, lateral_adhesion
 
-CLOSE = 1e-7
+ACCELERATION_TOLERANCE = 1e-7
 """What is left of the accelerations' error (m/s^2, and rad/s^2 times 1 m) when the loads are taken to be found."""
-HALF_ROUNDS, PATIENCE, WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
+HALF_ROUNDS, ANDERSON_ROUNDS, ROUNDS_PER_WINDOW, MOST_WINDOWS = 1, 12, 16, 1000
 """Rounds of a half step, to whose loads those of the step before are close enough for order two; rounds after which
 Anderson's method gives way to means; rounds between two looks at their progress; such windows without an answer."""
-SPREAD = 1e-3
+JUMP_WIDTH = 1e-3
 """Width (m/s^2, and rad/s^2 times 1 m) to which a jump is closed in where loads have an answer only as a mean: some
 newtons of the load of a truck's wheel."""
-NEARLY = 0.98
+LOCKING_SLIP = 0.98
 """Slip from which on the direction of the force goes over to that of a locked tyre: without a jump, which would leave
 some loads without an answer."""
 
 
 @inlined
-def times(row, vector):
+def scalar_product(row, vector):
     """Scalar product of a row and a vector."""
     total = 0.0
     for a in range(row.size):
@@ -59,14 +59,14 @@ def settle(motion, steer, regular, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
     the start of the step, and the wheels' steer angles and speeds along them are stored."""
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
-    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.still
-    headings(positions, units)
+    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.static_load
+    fill_headings(positions, units)
     for i in range(plane.unit.size):
         along, aside, g, k = frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
         still[i] = plane.static[i]
         if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
             heading = Direction(units[g, 0], units[g, 1])
-            ahead, left = rows(ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, along, aside)
+            ahead, left = fill_velocity_rows(ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, along, aside)
             for a in range(coordinates(plane)):
                 frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
             still[i] += plane.by_x[i] * ahead + plane.by_y[i] * left
@@ -77,17 +77,17 @@ def settle(motion, steer, regular, starts, vehicle, frame):
         c = units[k, 0] * wheels.cosine[i] - units[k, 1] * wheels.sine[i]
         s = units[k, 1] * wheels.cosine[i] + units[k, 0] * wheels.sine[i]
         centre = ChainPoint(k, plane.place[i, 0], plane.place[i, 1])
-        ahead, _ = rows(centre, Direction(c, s), units, rates, plane, along, aside)
-        u, v = times(along, rates), times(aside, rates)
+        ahead, _ = fill_velocity_rows(centre, Direction(c, s), units, rates, plane, along, aside)
+        u, v = scalar_product(along, rates), scalar_product(aside, rates)
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = ahead + v * rates[2 + k]
         slide(i, u, v, regular, frame.surfaces.lag, angles, wheels)
     inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
-    for a in range(prescribed(plane), coordinates(plane)):
-        for b in range(prescribed(plane)):
+    for a in range(count_of_prescribed(plane), coordinates(plane)):
+        for b in range(count_of_prescribed(plane)):
             frame.right[a] -= frame.mass[a, b] * motion.accelerations[b]
-    factor(frame.mass, plane)
+    factorise_mass(frame.mass, plane)
 
 
 @inlined
@@ -110,7 +110,7 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
     sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
     j, q = cell_and_share(tables.loads, load)
-    cells = Cells(int(wheels.cell[i]), wheels.share[i], j, q)
+    cells = TableCell(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
         StepInput(
             sign * step_input.speed0, sign * step_input.speed1, step_input.torque0, step_input.torque1, step_input.step
@@ -123,9 +123,9 @@ def tyre(i, step_input, wheel, tables, wheels, surfaces, report):
     if share > 0.0:
         side += share * (lateral_adhesion(second, cells, k, part, tables.g, tables.h) - side)
     side *= load
-    if slip > NEARLY and (along > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
+    if slip > LOCKING_SLIP and (along > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
         total, speed = math.hypot(force, side), math.hypot(along, v)
-        part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
+        part = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
         force += part * (total * along / speed - force)
         side += part * (total * abs(v) / speed - side)
     report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
@@ -159,17 +159,17 @@ def respond(motion, before, after, step, vehicle, frame):
     ``motion``. A step's solution is a fixed point of this map. before, after (W,) : torques at the ends of the step."""
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
     accelerations, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
-    load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start
-    size, free, lifts = coordinates(plane), prescribed(plane), False
+    load, still, rate, start = wheels.load, wheels.static_load, wheels.rate, wheels.start
+    size, free, lifts = coordinates(plane), count_of_prescribed(plane), False
     for a in range(size):
         out[a] = accelerations[a] if a < free else right[a]
     for i in range(load.size):
-        load[i] = still[i] + times(frame.press[i], accelerations)
+        load[i] = still[i] + scalar_product(frame.press[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
         share_out(load, plane.place)
     for i in range(load.size):
-        speed1 = start[i] + step * (rate[i] + times(along[i], accelerations))
+        speed1 = start[i] + step * (rate[i] + scalar_product(along[i], accelerations))
         given = StepInput(start[i], speed1, before[i], after[i], step)
         wheel = Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
         tyre(i, given, wheel, tables, wheels, surfaces, report)
@@ -182,9 +182,9 @@ def respond(motion, before, after, step, vehicle, frame):
 def stage(motion, before, after, step, most, vehicle, frame):
     """Search the mean accelerations over a step, and write them into ``motion``; its last ones are the first guess.
 
-    Anderson's method of depth one runs for at most ``most`` rounds. If they have not converged and were ``PATIENCE`` or
-    more, ``by_means`` takes over. Returns the estimated remaining error, from the last change and the ratio of the last
-    two.
+    Anderson's method of depth one runs for at most ``most`` rounds. If they have not converged and were
+    ``ANDERSON_ROUNDS`` or more, ``by_means`` takes over. Returns the estimated remaining error, from the last change
+    and the ratio of the last two.
     """
     accelerations, out, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
     size, left, last = coordinates(vehicle.plane), math.inf, 0.0
@@ -197,7 +197,7 @@ def stage(motion, before, after, step, most, vehicle, frame):
             product += off * (off - off0[a])
             square += (off - off0[a]) ** 2
         left = change * min(change / last, 1.0) if last > 0.0 else change
-        done, last = not left > CLOSE or rounds == most - 1, change
+        done, last = not left > ACCELERATION_TOLERANCE or rounds == most - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
         for a in range(size):
             off0[a] = out[a] - accelerations[a]
@@ -205,7 +205,11 @@ def stage(motion, before, after, step, most, vehicle, frame):
             out0[a] = out[a]
         if done:
             break
-    return left if left <= CLOSE or most < PATIENCE else by_means(motion, before, after, step, vehicle, frame)
+    return (
+        left
+        if left <= ACCELERATION_TOLERANCE or most < ANDERSON_ROUNDS
+        else by_means(motion, before, after, step, vehicle, frame)
+    )
 
 
 @lean
@@ -232,13 +236,13 @@ def by_means(motion, before, after, step, vehicle, frame):
     for _ in range(MOST_WINDOWS):
         way, net, most, change = 0.0, 0.0, 0.0, 0.0
         moved_to(accelerations, begun)
-        for _ in range(WINDOW):
+        for _ in range(ROUNDS_PER_WINDOW):
             respond(motion, before, after, step, vehicle, frame)
             change = 0.0
             for a in range(size):
                 change = max(change, abs(out[a] - accelerations[a]))
                 way += share * abs(out[a] - accelerations[a])
-            if not change > CLOSE:
+            if not change > ACCELERATION_TOLERANCE:
                 moved_to(out, accelerations)
                 return change
             most = max(most, change)
@@ -250,7 +254,7 @@ def by_means(motion, before, after, step, vehicle, frame):
         for a in range(size):
             net += abs(accelerations[a] - begun[a])
         turns, thrown = net < 0.5 * way, change > last
-        if (turns and share * change <= SPREAD) or (thrown and share * most <= SPREAD):
+        if (turns and share * change <= JUMP_WIDTH) or (thrown and share * most <= JUMP_WIDTH):
             for c in range(report.shape[0]):
                 moved_to(means[c], report[c])
             return 0.0
@@ -315,10 +319,16 @@ def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
     for half in (True, False):
         settle(motion, steer, regular, half, vehicle, frame)
         time, last = (0.5 * step, middle) if half else (step, torques[1])
-        most = HALF_ROUNDS if half else PATIENCE
-        if not stage(motion, torques[0], last, time, most, vehicle, frame) <= (math.inf if half else CLOSE):
+        most = HALF_ROUNDS if half else ANDERSON_ROUNDS
+        if not stage(motion, torques[0], last, time, most, vehicle, frame) <= (
+            math.inf if half else ACCELERATION_TOLERANCE
+        ):
             return -1.0
-        rest = comes_to_rest(rate0, turning, accelerations, step, plane) if half and not plane.hooked else -1.0
+        rest = (
+            comes_to_rest(rate0, turning, accelerations, step, plane)
+            if half and not plane.has_prescribed_hook
+            else -1.0
+        )
         if rest >= 0.0:
             time = rest
         for a in range(size):

@@ -45,10 +45,10 @@ class Plane(NamedTuple):
 
     masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
     whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
-    static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; hooked: 1 if the first two
-    coordinates are prescribed; fold: rad, angle of a hinge beyond which a train jackknifes; units (U,): their
-    numbers, of one alone as a tuple, whose size compiled functions know beforehand, so that none of them counts units
-    where there is no trailer.
+    static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; has_prescribed_hook: 1 if the
+    first two coordinates are prescribed; jackknife_angle: rad, angle of a hinge beyond which a train jackknifes; units
+    (U,): their numbers, of one alone as a tuple, whose size compiled functions know beforehand, so that none of them
+    counts units where there is no trailer.
     """
 
     masses: np.ndarray
@@ -62,8 +62,8 @@ class Plane(NamedTuple):
     static: np.ndarray
     by_x: np.ndarray
     by_y: np.ndarray
-    hooked: int
-    fold: float = math.inf
+    has_prescribed_hook: int
+    jackknife_angle: float = math.inf
     units: np.ndarray | tuple[int] = (0,)
 
     @property
@@ -72,7 +72,7 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def truck(vehicle: Truck, transfer: bool = True) -> Plane:
+def plane_of_truck(vehicle: Truck, transfer: bool = True) -> Plane:
     """``Plane`` of a two-axle vehicle; without ``transfer`` its wheel loads stay as they are at rest."""
     check_wheels(vehicle, vehicle.mass)
     none = np.zeros(4, dtype=np.int64)
@@ -124,7 +124,7 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
     return place, each("radius"), each("spin_inertia"), static, pitch * transfer, roll * transfer
 
 
-PAPER = Truck(
+PAPER_TRUCK = Truck(
     mass=5640.0,
     yaw_inertia=25000.0,
     height=1.2,

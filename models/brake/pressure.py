@@ -17,7 +17,7 @@ from models.brake.controller import APPLY, RELEASE, SLOW
 from models.core.errors import InputError
 from models.machine.compiled import lean
 
-NONE = np.zeros(0)
+NO_VALUES = np.zeros(0)
 
 
 class Chambers(NamedTuple):
@@ -28,13 +28,13 @@ class Chambers(NamedTuple):
     valves that apply slowly, none where there are no such valves.
     """
 
-    fill: np.ndarray
-    empty: np.ndarray
+    fill_time: np.ndarray
+    empty_time: np.ndarray
     supply: float
-    volumes: np.ndarray = NONE
+    volumes: np.ndarray = NO_VALUES
     reservoir: float = math.inf
     delay: float = 0.0
-    slow: np.ndarray = NONE
+    slow: np.ndarray = NO_VALUES
 
 
 class Air(NamedTuple):
@@ -52,7 +52,7 @@ class Air(NamedTuple):
 
 def resting_chambers(chambers: Chambers, sample: float) -> Air:
     """``Air`` at rest: zero pressure in all chambers, full supply pressure, all valves released; sample (s)."""
-    wheels = chambers.fill.size
+    wheels = chambers.fill_time.size
     if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
         raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
     rows = int(chambers.delay / sample) + 2
@@ -65,7 +65,7 @@ def resting_chambers(chambers: Chambers, sample: float) -> Air:
 
 
 @lean
-def chamber(pressure, valve, time, fill, empty, supply):
+def chamber_pressure(pressure, valve, time, fill, empty, supply):
     """Pressure (bar) of a chamber after a time (s) in which its valve applies, holds or releases."""
     if valve >= APPLY:
         return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
@@ -81,8 +81,8 @@ def press(valves, time, air, chambers, brakes):
     taken = 0.0
     for i in range(valves.size):
         before = air.pressure[i]
-        fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill[i]
-        after = chamber(before, valves[i], time, fill, chambers.empty[i], air.supply[0])
+        fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill_time[i]
+        after = chamber_pressure(before, valves[i], time, fill, chambers.empty_time[i], air.supply[0])
         air.pressure[i], air.torque[i] = after, torque(i, after, air.torque[i], brakes)
         if valves[i] >= APPLY and chambers.reservoir < math.inf:
             taken += chambers.volumes[i] * (after - before)

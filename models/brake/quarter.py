@@ -19,7 +19,7 @@ from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
 from models.tyre.tyre_table import Tables
 
-REGULAR = 0.1
+LEAST_SLIP_SPEED = 0.1
 """Speed (m/s) below which slip angles are those of this one: without a motion across there is none at all."""
 
 
@@ -77,7 +77,7 @@ class QuarterStop:
     """Motion from the start to the end, and the index of the step in which the vehicle came to rest, or -1."""
 
     path: QuarterPath
-    rest: int
+    step_of_rest: int
 
     @property
     def distance(self) -> float:
@@ -85,7 +85,7 @@ class QuarterStop:
         return float(self.path.position[-1] - self.path.position[0])
 
     @property
-    def released(self) -> float:
+    def release_time(self) -> float:
         """Time (s) at which the wheel first turned again after a locked period; NaN if it never did."""
         time, locked = self.path.time, self.path.locked
         held = np.flatnonzero(locked > 0.0)
@@ -104,7 +104,7 @@ def march(motion, torques, step, vehicle, path):
     rest, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
     for n in range(torques.shape[0] - 1):
         under_wheels(motion.state, step, vehicle, surfaces)
-        used = step_on(motion, torques[n : n + 2], step, straight, REGULAR, vehicle, surfaces)
+        used = step_on(motion, torques[n : n + 2], step, straight, LEAST_SLIP_SPEED, vehicle, surfaces)
         if used < 0.0:
             return -2
         if used < step and rest < 0:

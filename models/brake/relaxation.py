@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE, NOT_FOUND, ended
+from models.brake.advance import AT_REST, FINE, NOT_FOUND, end_status
 from models.brake.plane_chain import ChainPoint, velocity
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY
@@ -97,7 +97,7 @@ def advance_lagging(motion, torques, step, steer, vehicle, lag):
         if used < step:
             return AT_REST, time
         lag_on(motion.state, 0.5 * step, steer, vehicle, lag, surfaces.lag)
-        status = ended(motion, vehicle.plane)
+        status = end_status(motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time

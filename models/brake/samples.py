@@ -17,7 +17,7 @@ from numba.experimental import structref
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
-from models.brake.plane_records import REPORTED, PlaneMotion
+from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
 from models.machine.compiled import lean, named_closure, njit
@@ -45,7 +45,7 @@ class Row(NamedTuple):
 
 def row(coordinates: int, wheels: int) -> Row:
     """A ``Row`` of zeros for so many coordinates and wheels."""
-    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORTED, wheels))
+    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORT_SIZE, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     whole = np.zeros(ends[-1])
     columns = np.split(whole, ends[:-1])
@@ -178,19 +178,19 @@ def samples(subject):
         )
 
 
-def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
+def _with_globals(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
     """A copy of the function with other globals and without closure cells. numba identifies functions by the contents
     of these cells, which differ between processes if they hold compiled functions."""
     return FunctionType(function.__code__, globals() | given, function.__name__)
 
 
-Moving = Callable[..., Iterator[tuple[int, float, float, float]]]
+MoveSamples = Callable[..., Iterator[tuple[int, float, float, float]]]
 """Function of commands, record, sample, braking, motion and all others of a ``Subject`` that begins its ``samples``."""
 
 
-def moved(step_function: Callable[..., Any]) -> Moving:
+def moved(step_function: Callable[..., Any]) -> MoveSamples:
     """``samples`` that advances its vehicle by the given ``step_function``."""
-    march = _with(samples, some=_with(some_samples, go=step_function))
+    march = _with_globals(samples, some=_with_globals(some_samples, go=step_function))
 
     def begun(commands, record, sample, braking, motion, *others):
         return march(Subject(commands, record, sample, braking, motion, others))
@@ -211,8 +211,10 @@ class CompiledSamples:
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
     """Compiled version of ``moved``, for a compiled step function."""
-    some = lean(named_closure(_with(some_samples, go=step_function), name))
-    return CompiledSamples(njit(cache=True, error_model="numpy")(named_closure(_with(samples, some=some), name)))
+    some = lean(named_closure(_with_globals(some_samples, go=step_function), name))
+    return CompiledSamples(
+        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=some), name))
+    )
 
 
 by_steps = compiled(advance, "by_steps")

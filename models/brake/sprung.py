@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.brake.plane_vehicle import Axle, Plane, Truck, truck
+from models.brake.plane_vehicle import Axle, Plane, Truck, plane_of_truck
 from models.core.errors import InputError
 from models.multibody.numbers import Handling, Tyres
 from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
@@ -27,7 +27,7 @@ FOLD = math.pi / 2.0
 """Yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
 MOST_WHEELS = 8
 """Wheels of the longest train: a controller's frame has room for as many."""
-LEADING: tuple[tuple[str, Freedom], ...] = (
+LEADING_COORDINATES: tuple[tuple[str, Freedom], ...] = (
     (CARRIER, "x"),
     (CARRIER, "y"),
     (CARRIER, "rz"),
@@ -42,12 +42,12 @@ class Sprung:
     """A vehicle on its suspension as engines build it, and the plane vehicle with the same mass, axles and wheels,
     without trailers.
 
-    spins : (W,) kg m^2, inertias of the wheels, including those of trailers
+    wheel_inertias : (W,) kg m^2, inertias of the wheels, including those of trailers
     """
 
     handling: Handling
     plane: Truck
-    spins: tuple[float, ...]
+    wheel_inertias: tuple[float, ...]
 
     @property
     def size(self) -> int:
@@ -62,15 +62,15 @@ class Sprung:
     @property
     def turns(self) -> np.ndarray:
         """Numbers (towed,) of the yaw coordinates between each towed unit and the one that tows it."""
-        return self._turning("rz")
+        return self._turning_coordinates("rz")
 
     @property
     def leans(self) -> np.ndarray:
         """Numbers of the roll and pitch coordinates: of the chassis, then of each towed unit relative to the one before
         it."""
-        return np.concatenate(([ROLL, PITCH], self._turning("rx"), self._turning("ry")))
+        return np.concatenate(([ROLL, PITCH], self._turning_coordinates("rx"), self._turning_coordinates("ry")))
 
-    def _turning(self, freedom: Freedom) -> np.ndarray:
+    def _turning_coordinates(self, freedom: Freedom) -> np.ndarray:
         free = self.handling.vehicle
         places = [(hitch_of(name), freedom) for name in free.towed]
         known = free.coordinates()
@@ -81,7 +81,7 @@ class Sprung:
 
         Each hitch is taken to lie in the middle plane of the towing unit.
         """
-        alone, free = truck(self.plane, transfer), self.handling.vehicle
+        alone, free = plane_of_truck(self.plane, transfer), self.handling.vehicle
         if not free.towed:
             return alone
         units = [_unit(free, name) for name in (None, *free.towed)]
@@ -99,11 +99,11 @@ class Sprung:
             group=unit.copy(),
             place=place,
             radius=np.array([tyre.point[2] for tyre in free.tyres]),
-            spin=np.array(self.spins),
+            spin=np.array(self.wheel_inertias),
             static=np.array([self.handling.held.tyres[tyre.name] for tyre in free.tyres]),
             by_x=none,
             by_y=none.copy(),
-            fold=FOLD,
+            jackknife_angle=FOLD,
             units=np.arange(len(units)),
         )
 
@@ -134,7 +134,7 @@ def _yaw_inertia(bodies: list[Body], x: float, y: float) -> float:
     )
 
 
-def sprung(
+def suspended_vehicle(
     vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5, forces: Literal["native", "compiled"] = "native"
 ) -> Sprung:
     """A two-axle vehicle with two wheels per axle, and its trailers; spin_inertia (kg m^2): for wheels whose tyres name
@@ -148,17 +148,17 @@ def sprung(
     here; forces : whose the springs of what is towed are, see ``Handling``. Raises InputError for a vehicle of other
     axles, that tows other than in a row, or that cannot be steered.
     """
-    tyres = _ordered(vehicle)
+    tyres = _tyres_by_axle(vehicle)
     _check_row(vehicle)
-    inertias = _spins(vehicle.name, tyres, spin_inertia)
-    centred = _displaced(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
+    inertias = _wheel_inertias(vehicle.name, tyres, spin_inertia)
+    centred = _displaced_vehicle(replace(vehicle, tyres=tuple(tyres)), -centre_of_mass(vehicle))
     handling = Handling(centred, Tyres(spin_inertia=0.0), forces=forces)
-    if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
+    if handling.vehicle.coordinates()[: len(LEADING_COORDINATES)] != LEADING_COORDINATES:
         raise ValueError("the carrier and the sway are not the first bodies")
-    return Sprung(handling, _plane(centred, inertias, front), tuple(inertias))
+    return Sprung(handling, _plane_truck(centred, inertias, front), tuple(inertias))
 
 
-def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
+def _tyres_by_axle(vehicle: SpatialVehicle) -> list[Tyre]:
     """Tyres axle by axle, left before right; InputError unless the vehicle has two axles, and these and all trailer
     axles have two tyres each."""
     tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
@@ -176,7 +176,7 @@ def _ordered(vehicle: SpatialVehicle) -> list[Tyre]:
     return tyres
 
 
-def _spins(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
+def _wheel_inertias(name: str, tyres: list[Tyre], spin_inertia: float) -> list[float]:
     """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
     equal."""
     inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
@@ -206,7 +206,7 @@ def without_trailer(vehicle: SpatialVehicle) -> list[Body]:
     return [body for body in vehicle.bodies if vehicle.towed_under(body.name) is None]
 
 
-def centre(vehicle: SpatialVehicle) -> np.ndarray:
+def centre_of_mass(vehicle: SpatialVehicle) -> np.ndarray:
     """Centre of mass (3,) in m, in the design position, of a vehicle without its trailers."""
     bodies = without_trailer(vehicle)
     masses = np.array([body.mass for body in bodies])
@@ -217,7 +217,7 @@ POSITION_FIELDS = ("position", "point", "first_point", "second_point", "point_le
 """What parts of a vehicle call their places."""
 
 
-def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
+def _displaced_vehicle(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     """The vehicle with all positions shifted by ``distance`` on the ground."""
 
     def at(part: Any, name: str) -> Vector:
@@ -234,7 +234,7 @@ def _displaced(vehicle: SpatialVehicle, distance: np.ndarray) -> SpatialVehicle:
     return replace(vehicle, **parts, axles=tuple(float(x + distance[0]) for x in vehicle.axles))
 
 
-def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
+def _plane_truck(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float) -> Truck:
     """``Truck`` in the plane of a vehicle centred at its mass centre, without trailers; spin_inertias (kg m^2): of its
     wheels."""
     bodies = without_trailer(vehicle)
@@ -253,7 +253,7 @@ def _plane(vehicle: SpatialVehicle, spin_inertias: Sequence[float], front: float
     return Truck(
         mass=sum(body.mass for body in bodies),
         yaw_inertia=_yaw_inertia(bodies, 0.0, 0.0),
-        height=float(centre(vehicle)[2]),
+        height=float(centre_of_mass(vehicle)[2]),
         front=front_axle,
         rear=rear_axle,
     )

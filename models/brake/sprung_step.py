@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, FOLDED
-from models.brake.plane_records import TURNING, Wheels, report_of
+from models.brake.plane_records import TURNING_ROW, Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
@@ -178,13 +178,13 @@ PLANE = 3
 class Units(NamedTuple):
     """The vehicle and its trailers as units in the plane.
 
-    turns (U - 1,) : numbers of the yaw coordinates of each trailer relative to the unit before it; leans (L,) : numbers
-    of the roll and pitch coordinates; motion (2, 2 + U) : position of the first unit and headings of all, and their
-    rates.
+    turns (U - 1,) : numbers of the yaw coordinates of each trailer relative to the unit before it; lean_coordinates
+    (L,) : numbers of the roll and pitch coordinates; motion (2, 2 + U) : position of the first unit and headings of
+    all, and their rates.
     """
 
     turns: np.ndarray
-    leans: np.ndarray
+    lean_coordinates: np.ndarray
     motion: np.ndarray
 
 
@@ -204,8 +204,8 @@ def ended(q, units, fold):
     for k in range(units.turns.size):
         if not abs(q[units.turns[k]]) <= fold:
             status = FOLDED
-    for k in range(units.leans.size):
-        if not abs(q[units.leans[k]]) <= UPRIGHT:
+    for k in range(units.lean_coordinates.size):
+        if not abs(q[units.lean_coordinates[k]]) <= UPRIGHT:
             status = OVER
     return status
 
@@ -292,9 +292,9 @@ def advance(motion, torques, step, steer, vehicle, course):
             hold(known, before, after, step, motion, vehicle)
             if not march(course.engine, q, v):
                 return GAVE_UP, time
-            turning[:] = motion.report[TURNING]
+            turning[:] = motion.report[TURNING_ROW]
         time += step
-        status = ended(q, units, vehicle.plane.fold)
+        status = ended(q, units, vehicle.plane.jackknife_angle)
         if status != FINE:
             return status, time
     return FINE, time

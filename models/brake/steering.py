@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.brake.figures_of_merit import crossing
+from models.brake.figures_of_merit import crossing_time
 
 REACHED_SHARE, HALF_SHARE = 0.9, 0.5
 """Share of the steady yaw rate by which the response is timed, and of the last angle from which."""
@@ -39,14 +39,14 @@ class Steering:
 @dataclass(frozen=True)
 class YawResponse:
     """time : s, from half of the final steer angle to 90 % of the steady yaw rate; overshoot : ratio of peak yaw rate
-    above the steady one to the steady one; steady : yaw rate, rad/s."""
+    above the steady one to the steady one; steady_rate : yaw rate, rad/s."""
 
     time: float
     overshoot: float
-    steady: float
+    steady_rate: float
 
 
-def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
+def yaw_response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawResponse | None:
     """Step response from yaw rates (n,) in rad/s at times (n,) in s; None if the last second is not steady.
 
     half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
@@ -57,4 +57,4 @@ def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> YawRespon
     if np.ptp(end) > STEADY_RANGE * abs(steady) or steady == 0.0:
         return None
     share = yaw_rates / steady
-    return YawResponse(crossing(times, -share, -REACHED_SHARE) - half, float(max(share.max() - 1.0, 0.0)), steady)
+    return YawResponse(crossing_time(times, -share, -REACHED_SHARE) - half, float(max(share.max() - 1.0, 0.0)), steady)

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from models.brake.plane_chain import headings, inertia
+from models.brake.plane_chain import fill_headings, inertia
 from models.brake.plane_records import motion_of, report_of
 from models.brake.plane_step import step_on
-from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
+from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, plane_of_truck, wheels
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad, surfaces_of, under_wheels
 from models.core.errors import InputError
 from models.core.strict import quantity
@@ -39,24 +39,24 @@ class Trailer(Truck):
     )
 
 
-def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_trailer(trailer: Trailer, transfer: bool = True) -> Plane:
     """``Plane`` of a trailer whose hook has a prescribed motion; the hook's position is the first two coordinates."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
+    parts: list[Any] = [*_units_of_train(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
     return Plane(*parts)
 
 
-def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
     """``Plane`` of a truck with a trailer on its hook: eight wheels."""
-    truck_records, reach = truck(vehicle, transfer), np.zeros((3, 3))
+    truck_records, reach = plane_of_truck(vehicle, transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
-    units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units(trailer), strict=True))
+    units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
     both = (np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True))
     parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
 
 
-def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
+def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
     return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
 
 
@@ -79,7 +79,7 @@ class Pull(NamedTuple):
     forces: np.ndarray
 
 
-def follow(
+def follow_hook(
     plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
 ) -> Pull:
     """Motion of a trailer behind a hook with prescribed velocities (n + 1, 2) in m/s at the steps' ends; step (s).
@@ -87,20 +87,20 @@ def follow(
     state (2, 2 + U) : positions and rates at the start; slope : see ``OnRoad``; torques (W,) : of its brakes, N m.
     Raises InputError.
     """
-    if not plane.hooked:
+    if not plane.has_prescribed_hook:
         raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
     pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
     turning = np.hypot(*state[1, :2]) / plane.radius
     motion = motion_of(state.copy(), turning)
     vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, UNIFORM_ROAD)
     constant = np.tile(np.asarray(torques, float), (2, 1))
-    if not _follow(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
+    if not _march_trailer(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
     return pull
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(motion, hook, step, torques, vehicle, pull):
+def _march_trailer(motion, hook, step, torques, vehicle, pull):
     plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
     size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
     mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
@@ -111,7 +111,7 @@ def _follow(motion, hook, step, torques, vehicle, pull):
         if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, surfaces) < 0.0:
             return False
         states[n + 1] = state
-        headings(0.5 * (states[n, 0] + state[0]), units)
+        fill_headings(0.5 * (states[n, 0] + state[0]), units)
         inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, along, across)
         forces[n] = (mass @ accelerations - right)[:2]
         for i in range(plane.unit.size):
@@ -122,7 +122,7 @@ def _follow(motion, hook, step, torques, vehicle, pull):
     return True
 
 
-CHOSEN = Trailer(
+CHOSEN_TRAILER = Trailer(
     mass=4500.0,
     yaw_inertia=15000.0,
     height=1.2,

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.machine.compiled import lean
-from models.tyre.tyre_table import Cells, cell_and_share, longitudinal_adhesion
+from models.tyre.tyre_table import TableCell, cell_and_share, longitudinal_adhesion
 
 SLOWEST_SPEED = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
@@ -45,7 +45,7 @@ class Grip(NamedTuple):
     first: int
     second: int
     share: float
-    cells: Cells
+    cells: TableCell
     load: float
     slips: np.ndarray
     mu_x: np.ndarray
@@ -79,7 +79,7 @@ def phi_1(z):
 
 
 @lean
-def passed(distance, rate, decay, time):
+def distance_integral(distance, rate, decay, time):
     """Integral over a time of the distance covered at a rate that decays as exp(-decay t), ``distance`` being its end
     value.
 
@@ -91,7 +91,7 @@ def passed(distance, rate, decay, time):
 
 
 @lean
-def node(k, slips):
+def slip_at_node(k, slips):
     """Slip at node k; for a negative k, minus the slip at node -k."""
     return slips[k] if k >= 0 else -slips[-k]
 
@@ -119,7 +119,7 @@ def roll(slip, remaining, kappa, fade, held, grip):
         cell = -cell - 1
     low, high = node_force(cell, grip), node_force(cell + 1, grip)
     for _ in range(MOST_PIECES):
-        bottom, top = node(cell, slips), node(cell + 1, slips)
+        bottom, top = slip_at_node(cell, slips), slip_at_node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
         rate = kappa * (held - high - slope * (slip - top)) + (1.0 - slip) * fade
         target, turn = (top, 1) if rate > 0.0 else (bottom, -1)
@@ -135,19 +135,19 @@ def roll(slip, remaining, kappa, fade, held, grip):
                 low, high = node_force(cell, grip), low
             continue
         decay = kappa * slope + fade
-        time = _way(decay, rate, target - slip)
+        time = _time_of_distance(decay, rate, target - slip)
         if used + time >= remaining:
             some = remaining - used
             way = rate * some * phi_1(-decay * some)
             end = min(slip + way, target) if turn > 0 else max(slip + way, target)  # not beyond it by rounding
-            return remaining, end, area + some * slip + passed(way, rate, decay, some)
-        area += time * slip + passed(target - slip, rate, decay, time)
+            return remaining, end, area + some * slip + distance_integral(way, rate, decay, some)
+        area += time * slip + distance_integral(target - slip, rate, decay, time)
         used, slip, turned = used + time, target, 0
     return used, math.nan, area
 
 
 @lean
-def _way(decay, rate, way):
+def _time_of_distance(decay, rate, way):
     """Time in which the distance ``way`` is covered at a rate that decays as exp(-decay t); infinite if it never is."""
     if rate == 0.0:
         return math.inf

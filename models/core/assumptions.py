@@ -32,7 +32,8 @@ Watched = Mapping[str, np.ndarray | Gaussian]
 
 @dataclass(frozen=True)
 class Assumption:
-    """One assumption: that the values of ``watched`` stay between ``least`` and ``most``, in ``unit``.
+    """One assumption: that the values of ``watched_values`` stay between ``lower_limit`` and ``upper_limit``, in
+    ``unit``.
 
     name : a few words; says : a sentence; remedy : what removes the assumption, such as an effect to name.
     """
@@ -40,18 +41,20 @@ class Assumption:
     name: str
     says: str
     remedy: str
-    watched: Callable[[Result], Watched]
+    watched_values: Callable[[Result], Watched]
     unit: str
-    least: float = -math.inf
-    most: float = math.inf
+    lower_limit: float = -math.inf
+    upper_limit: float = math.inf
 
     @property
     def allowed(self) -> str:
         """Text on the allowed range."""
-        low, high = f"at least {self.least:g}", f"at most {self.most:g}"
-        if math.isinf(self.most):
+        low, high = f"at least {self.lower_limit:g}", f"at most {self.upper_limit:g}"
+        if math.isinf(self.upper_limit):
             return f"{low} {self.unit}".rstrip()
-        return (high if math.isinf(self.least) else f"from {self.least:g} to {self.most:g}") + f" {self.unit}".rstrip()
+        return (
+            high if math.isinf(self.lower_limit) else f"from {self.lower_limit:g} to {self.upper_limit:g}"
+        ) + f" {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ class BrokenAssumption:
     law: str = ""
 
     @property
-    def _worst(self) -> str:
+    def _worst_value_text(self) -> str:
         """Text with the worst value in four digits and its unit; no power of ten below a million."""
         return f"worst {float(f'{self.worst:.4g}'):g} {self.unit}".rstrip()
 
@@ -83,10 +86,10 @@ class BrokenAssumption:
 
     def fact(self) -> str:
         """Sentence that the assumption was broken, for readers who know the assumption."""
-        return f"{self.says}; {self.where}, {self._time}, {self._worst}"
+        return f"{self.says}; {self.where}, {self._time_text}, {self._worst_value_text}"
 
     @property
-    def _time(self) -> str:
+    def _time_text(self) -> str:
         if math.isnan(self.first) and not self.law:
             return "once"
         return f"{100.0 * self.share:.3g} % of the time" + self.law
@@ -95,28 +98,28 @@ class BrokenAssumption:
         """A full sentence for readers who do not know the assumption."""
         first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, {self._worst} "
+            f"assumption broken: {self.says}; {self.where}: {self._time_text}{first}, {self._worst_value_text} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 
 
-def broken(run: Result, assumption: Assumption) -> BrokenAssumption | None:
+def worst_violation(run: Result, assumption: Assumption) -> BrokenAssumption | None:
     """The worst violation of an assumption in a run, or None if there is none; NaN and infinite values are not
     judged."""
     judged = [
         _longest_exceedance(run, assumption, where, values)
         if isinstance(values, Gaussian)
-        else _broken(run, assumption, where, np.asarray(values, float))
-        for where, values in assumption.watched(run).items()
+        else _gaussian_violation(run, assumption, where, np.asarray(values, float))
+        for where, values in assumption.watched_values(run).items()
     ]
     return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
-def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
-    beyond = (values < a.least) | (values > a.most)
+def _gaussian_violation(run: Result, a: Assumption, where: str, values: np.ndarray) -> BrokenAssumption | None:
+    beyond = (values < a.lower_limit) | (values > a.upper_limit)
     if not beyond.any():
         return None
-    excess = np.where(beyond, np.maximum(a.least - values, values - a.most), -np.inf)
+    excess = np.where(beyond, np.maximum(a.lower_limit - values, values - a.upper_limit), -np.inf)
     timed = "time" in run.data.coords and len(values) == len(run.times)
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
@@ -129,7 +132,7 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
     from scipy.special import ndtr
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = np.array([a.least - values.mean, values.mean - a.most]) / values.deviation
+        sides = np.array([a.lower_limit - values.mean, values.mean - a.upper_limit]) / values.deviation
     known = np.isfinite(values.deviation) & (values.deviation > 0.0)
     shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
     if not (shares > ALLOWED_TIME_SHARE).any():
@@ -146,28 +149,28 @@ def _longest_exceedance(run: Result, a: Assumption, where: str, values: Gaussian
 def with_assumptions(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with a list of its assumptions and of those that it violates; its status names violations, too."""
     listed = list(assumptions)
-    breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]
+    breaches = [breach for breach in (worst_violation(run, each) for each in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
         {"assumed": [each.says for each in listed], "broken": [asdict(breach) for breach in breaches]}
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
-    _NOTED.get()(run)
+    _RESULT_OBSERVER.get()(run)
     return run
 
 
-_NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
+_RESULT_OBSERVER: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
 
 
 @contextmanager
 def watching(note: Callable[[Result], None]) -> Iterator[None]:
     """Context in which ``note`` is called with each result that is checked for assumptions. Of nested contexts only the
     inner one is called."""
-    before = _NOTED.set(note)
+    before = _RESULT_OBSERVER.set(note)
     try:
         yield
     finally:
-        _NOTED.reset(before)
+        _RESULT_OBSERVER.reset(before)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
@@ -188,7 +191,7 @@ def assumed_of(run: Result) -> list[str]:
 
 
 @contextmanager
-def breaches() -> Iterator[dict[str, BrokenAssumption]]:
+def collected_breaches() -> Iterator[dict[str, BrokenAssumption]]:
     """Context that collects the assumptions violated by the results checked inside: the worst violation of each, by
     name."""
     worst: dict[str, BrokenAssumption] = {}

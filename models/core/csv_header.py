@@ -15,36 +15,36 @@ from typing import NamedTuple
 from models.core.errors import InputError
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
-BETWEEN = 3
+MOST_ROWS_BETWEEN = 3
 """Most rows between the headings and the numbers."""
-NUMBER = re.compile(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
-MARKS = re.compile(
+NUMBER_PATTERN = re.compile(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
+MISSING_VALUE_PATTERN = re.compile(
     r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)?|missing|\*+|\?+|no ?data|void|"
     r"#value!|#div/0!|[+-]?1[.,]#(qnan|ind)0*)?\s*",
     re.IGNORECASE,
 )
 """Cells that say that nothing was measured."""
-TIMED = re.compile(
+CLOCK_TIME_PATTERN = re.compile(
     r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
     r"am|pm)?\s*",
     re.IGNORECASE,
 )
 """Cells that are a time of the clock, in whatever notation."""
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
-_HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
+_THOUSANDS_PATTERN = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_HEADING_PATTERN = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
 
 
-class Line(NamedTuple):
+class FileLine(NamedTuple):
     """A line of the file: number from 1, text without the line end, and the bytes where it begins and ends."""
 
     number: int
     text: str
-    begin: int
+    first_byte: int
     end: int
 
 
 @dataclass(frozen=True)
-class Head:
+class TableHead:
     """Headings of a table, and the lines around them up to the numbers.
 
     header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
@@ -52,16 +52,16 @@ class Head:
     and numbers. begin, line : byte where the rows of numbers begin, and number of the line before them.
     """
 
-    header: Line
+    header: FileLine
     separator: str
     names: tuple[str, ...]
     width: int
-    titles: tuple[Line, ...]
-    between: tuple[Line, ...]
+    titles: tuple[FileLine, ...]
+    between: tuple[FileLine, ...]
     begin: int
     line: int
 
-    def cells(self, line: Line) -> tuple[str, ...]:
+    def cells(self, line: FileLine) -> tuple[str, ...]:
         """Cells of a line, cut to the number of headings."""
         return tuple((split_cells(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
 
@@ -69,7 +69,7 @@ class Head:
         """Group name of each heading, from the row above if it has as many cells. An empty cell repeats the one before
         it. Empty if there is no such row."""
         above = split_cells(self.titles[-1].text, self.separator) if self.titles else []
-        if len(self.names) < 3 or len(trimmed(above)) < 2 or len(above) not in (len(self.names), self.width):
+        if len(self.names) < 3 or len(without_empty_end(above)) < 2 or len(above) not in (len(self.names), self.width):
             return ()
         groups = [""]
         for cell in above[: len(self.names)]:
@@ -77,9 +77,9 @@ class Head:
         return tuple(groups[1:])
 
 
-def heading(text: str) -> tuple[str, str]:
+def name_and_unit(text: str) -> tuple[str, str]:
     """Name and unit in one heading; the unit is in the last pair of brackets, and is empty if there are none."""
-    match = _HEADING.fullmatch(text)
+    match = _HEADING_PATTERN.fullmatch(text)
     name, unit = match.groups("") if match else (text, "")
     return name.strip(), unit.strip()
 
@@ -92,7 +92,7 @@ def split_cells(text: str, separator: str) -> list[str]:
         return [text]
 
 
-def trimmed(cells: Sequence[str]) -> list[str]:
+def without_empty_end(cells: Sequence[str]) -> list[str]:
     """Cells without the empty ones at the end."""
     used = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
     return list(cells[:used])
@@ -115,7 +115,7 @@ def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequ
             "the numbers hold points and commas: write them "
             "with one decimal sign and nothing else, without separators of thousands"
         )
-    elif separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
+    elif separator == "," and all(map(_THOUSANDS_PATTERN.fullmatch, commas)):
         why = "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else"
     if why:
         raise InputError(path, f"line {line_number} and after", commas[0], why)
@@ -124,27 +124,30 @@ def decimal_sign(path: str | Path, line_number: int, separator: str, cells: Sequ
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a number, with a decimal point or comma."""
-    return NUMBER.fullmatch(cell) is not None
+    return NUMBER_PATTERN.fullmatch(cell) is not None
 
 
-def find_head(lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
-    """One ``Head`` for each separator with which a line is headings above numbers; the first such line is used. Empty
-    if there is none."""
+def find_head(
+    lines: Sequence[FileLine], is_known_heading: Callable[[str], bool], separators: Sequence[str]
+) -> list[TableHead]:
+    """One ``TableHead`` for each separator with which a line is headings above numbers; the first such line is used.
+    Empty if there is none."""
     heads = (
-        [head for sign in separators if (head := _head(lines, i, is_known_heading, sign))] for i in range(len(lines))
+        [head for sign in separators if (head := _head_in_line(lines, i, is_known_heading, sign))]
+        for i in range(len(lines))
     )
     return next(filter(None, heads), [])
 
 
 def find_headings(
-    lines: Sequence[Line], is_known_heading: Callable[[str], bool], separators: Sequence[str]
-) -> list[Head]:
+    lines: Sequence[FileLine], is_known_heading: Callable[[str], bool], separators: Sequence[str]
+) -> list[TableHead]:
     """Headings in the first line with a known heading, whatever rows follow it. Errors in these rows are found when
     they are read."""
     for i, line in enumerate(lines):
-        parted = {sign: trimmed(split_cells(line.text, sign)) for sign in separators}
+        parted = {sign: without_empty_end(split_cells(line.text, sign)) for sign in separators}
         heads = [
-            Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
+            TableHead(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
             for sign, names in parted.items()
             if len(names) > 1 and any(map(is_known_heading, names))
         ]
@@ -153,20 +156,24 @@ def find_headings(
     return []
 
 
-def _head(lines: Sequence[Line], i: int, is_known_heading: Callable[[str], bool], separator: str) -> Head | None:
+def _head_in_line(
+    lines: Sequence[FileLine], i: int, is_known_heading: Callable[[str], bool], separator: str
+) -> TableHead | None:
     """Headings in line ``i`` if a row of numbers follows; else None."""
-    names = trimmed(split_cells(lines[i].text, separator))
+    names = without_empty_end(split_cells(lines[i].text, separator))
     place = next((k for k, name in enumerate(names) if is_known_heading(name)), None)
-    if place is None or len(names) < 2 or any(is_number(name) or TIMED.fullmatch(name) for name in names):
+    if place is None or len(names) < 2 or any(is_number(name) or CLOCK_TIME_PATTERN.fullmatch(name) for name in names):
         return None
-    for j in range(i + 1, min(i + 2 + BETWEEN, len(lines))):
+    for j in range(i + 1, min(i + 2 + MOST_ROWS_BETWEEN, len(lines))):
         cells = split_cells(lines[j].text, separator)
-        if not (len(cells) >= len(names) >= len(trimmed(cells))):
+        if not (len(cells) >= len(names) >= len(without_empty_end(cells))):
             return None
-        if is_number(cells[place]) or TIMED.fullmatch(cells[place]):
+        if is_number(cells[place]) or CLOCK_TIME_PATTERN.fullmatch(cells[place]):
             above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
             first = lines[j]
-            return Head(lines[i], separator, tuple(names), len(cells), above, between, first.begin, first.number - 1)
+            return TableHead(
+                lines[i], separator, tuple(names), len(cells), above, between, first.first_byte, first.number - 1
+            )
         if any(is_number(cell) or is_known_heading(cell) for cell in cells):
             return None
     return None
@@ -180,39 +187,41 @@ def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
     lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the
     reader to refuse; InputError where a comma can be a decimal sign or one of thousands.
     """
-    lines = [Line(i, line, i, i) for i, line in enumerate(text.split("\n"), start=1)]
+    lines = [FileLine(i, line, i, i) for i, line in enumerate(text.split("\n"), start=1)]
     asked = separator_line(lines[0].text)
     used = [line for line in lines[bool(asked) :] if line.text.strip() and not line.text.startswith("#")]
-    heads = find_head(used, lambda cell: heading(cell)[0] in wanted, (asked,) if asked else tuple(SEPARATORS))
+    heads = find_head(used, lambda cell: name_and_unit(cell)[0] in wanted, (asked,) if asked else tuple(SEPARATORS))
     if len(heads) != 1 or not heads[0].separator or asked not in ("", *SEPARATORS):
         return text
-    return _rewritten(path, lines, heads[0])
+    return _plain_table(path, lines, heads[0])
 
 
-def _rewritten(path: str | Path, lines: list[Line], header: Head) -> str:
+def _plain_table(path: str | Path, lines: list[FileLine], header: TableHead) -> str:
     """Text of the table with headings and rows in the plain form."""
     rows = {line.number: split_cells(line.text, header.separator) for line in lines[header.line :]}
     cells = [cell for row in rows.values() for cell in row]
     sign = decimal_sign(path, header.line + 1, header.separator, cells)
     new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: header.line]}
-    new[header.header.number] = ",".join(_headings(header))
+    new[header.header.number] = ",".join(_headings_with_units(header))
     for number, row in rows.items():
         kept = row[: len(header.names)] if len(row) == header.width and not any(row[len(header.names) :]) else row
-        new[number] = ",".join(_plain(cell, sign) for cell in kept)
+        new[number] = ",".join(_plain_cell(cell, sign) for cell in kept)
     return "\n".join(new[line.number] for line in lines)
 
 
-def _headings(header: Head) -> list[str]:
+def _headings_with_units(header: TableHead) -> list[str]:
     """Headings, completed by the units in the row beneath them if there is one."""
     if len(header.between) != 1:
         return list(header.names)
     units = [cell.strip("[]() ") for cell in header.cells(header.between[0])]
-    return [name if heading(name)[1] else f"{name} [{unit}]" for name, unit in zip(header.names, units, strict=True)]
+    return [
+        name if name_and_unit(name)[1] else f"{name} [{unit}]" for name, unit in zip(header.names, units, strict=True)
+    ]
 
 
-def _plain(cell: str, sign: str) -> str:
+def _plain_cell(cell: str, sign: str) -> str:
     """Cell text in plain form: a number with a decimal point, ``nan`` for a mark of missing data, other text without
     commas."""
     if is_number(cell) and sign == ",":
         return cell.replace(",", ".")
-    return "nan" if cell and MARKS.fullmatch(cell) else cell.replace(",", ";")
+    return "nan" if cell and MISSING_VALUE_PATTERN.fullmatch(cell) else cell.replace(",", ";")

@@ -19,20 +19,20 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 
-WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
+WARNED_SHARE, REFUSED_SHARE, GOAL_SHARE = 0.02, 0.5, 0.005
 """Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
-WINDOW, FINE_WINDOW = 0.4, 0.3
+REPEATED_SHARE, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
-STEEPEST = 4.0
+STEEPEST_ERROR_GROWTH = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
-CELLS = "cells along each axis"
+CELLS_NOTE = "cells along each axis"
 """What an estimate is of that a coarser grid told."""
-FALL, FLOOR = 0.6, 0.03
+TOLERANCE_POWER, LEAST_TOLERANCE_SHARE = 0.6, 0.03
 """Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
 share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
-UNMOVED_DEVIATION, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
+UNMOVED_DEVIATION, ONE_ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
 
@@ -41,8 +41,8 @@ class Estimate:
     """Estimated error of a channel: ``error`` in its unit, ``share`` relative to its standard deviation, ``order`` of
     convergence.
 
-    step : longest step (s), or fewest cells, that would hold the share to GOAL; 0 where no step mends it. of : CELLS
-    where it is of cells.
+    step : longest step (s), or fewest cells, that would hold the share to GOAL_SHARE; 0 where no step mends it. of :
+    CELLS_NOTE where it is of cells.
     """
 
     error: float
@@ -55,7 +55,7 @@ class Estimate:
     @property
     def warned(self) -> bool:
         """Whether the error is so large that the user must be warned."""
-        return not self.share <= WARNED
+        return not self.share <= WARNED_SHARE
 
     def advice(self, step_unit: str) -> str:
         """Advice on reducing the estimated error, ``step_unit`` the unit of steps."""
@@ -66,7 +66,7 @@ class Estimate:
     @property
     def refused(self) -> bool:
         """Whether the error makes the channel useless. An error that no smaller step reduces gives a warning only."""
-        return not self.share <= REFUSED and self.step != 0.0
+        return not self.share <= REFUSED_SHARE and self.step != 0.0
 
 
 def size_of(values: np.ndarray) -> float:
@@ -103,8 +103,8 @@ def estimate(
         window = slice(0, 2 * len(coarser) - 1, 2)
         order = observed_order(_rms((fine - coarse)[window]), _rms(coarse[window] - coarser), declared)
     largest = float(np.abs(fine).max(initial=0.0))
-    error = max(gap / (2.0**order - 1.0), ROUNDING * largest * math.sqrt(len(fine)))
-    return rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
+    error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine)))
+    return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
 
 
 def _rms(values: np.ndarray) -> float:
@@ -150,7 +150,9 @@ def estimated(
     told, how = by_steps(fine, rerun, order, step, growth, sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     known |= fine.units
-    return stated(run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in told.items()}, how)
+    return with_stated_errors(
+        run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in told.items()}, how
+    )
 
 
 def by_steps(
@@ -171,7 +173,7 @@ def by_steps(
     except (InputError, RunFailed):
         told, how = _by_half_steps(fine, rerun, order, step, growth or {}), "a part in half the step"
     for name, size in (sizes or {}).items():
-        told[name] = rescaled(told[name], size, step)
+        told[name] = estimate_rescaled(told[name], size, step)
     return told, how
 
 
@@ -179,7 +181,7 @@ def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> d
     coarse = rerun(2.0, 1.0)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
-        coarser = rerun(4.0, WINDOW).channels
+        coarser = rerun(4.0, REPEATED_SHARE).channels
     rows = rows_at(fine.times, coarse.times)
     return {
         name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
@@ -200,13 +202,16 @@ def _by_half_steps(
     for name, values in fine.channels.items():
         error = estimate(finer.channels[name][rows], values[part], order, step)
         later = max(
-            _later(values[part] - finer.channels[name][rows], values) if part[0] else 1.0, growth.get(name, 1.0)
+            _growth_after_window(values[part] - finer.channels[name][rows], values) if part[0] else 1.0,
+            growth.get(name, 1.0),
         )
-        told[name] = rescaled(replace(error, error=error.error * 2.0**error.order * later), size_of(values), step)
+        told[name] = estimate_rescaled(
+            replace(error, error=error.error * 2.0**error.order * later), size_of(values), step
+        )
     return told
 
 
-def _later(gap: np.ndarray, values: np.ndarray) -> float:
+def _growth_after_window(gap: np.ndarray, values: np.ndarray) -> float:
     """Ratio of the error's rms over the whole run to that over the first rows, in which ``gap`` (k, ...) is the
     difference of two runs.
 
@@ -220,13 +225,13 @@ def _later(gap: np.ndarray, values: np.ndarray) -> float:
     bends = np.diff(values, 2, axis=0)
     before, over_all = _rms(bends[: len(gap) - 2]), _rms(bends)
     rougher = over_all / before if before > 0.0 else 1.0
-    return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST))
+    return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST_ERROR_GROWTH))
 
 
-def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
+def estimate_rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
     """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
     share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
-    wanted = (share / GOAL) ** (1.0 / estimate.order) if share < math.inf else 1.0
+    wanted = (share / GOAL_SHARE) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
 
@@ -240,8 +245,8 @@ def of_tolerance(
     run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
 ) -> Result:
     """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
-    times as large. The error is assumed to grow only with the power FALL of the tolerance, so that it is overestimated.
-    ``sizes`` as in ``estimated``.
+    times as large. The error is assumed to grow only with the power TOLERANCE_POWER of the tolerance, so that it is
+    overestimated. ``sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -251,18 +256,21 @@ def of_tolerance(
     for name, values in fine.channels.items():
         same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
         at = values if same else CubicSpline(fine.times, values)(looser.times)
-        error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), FLOOR * tolerance * size_of(values))
-        estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
-        told[name] = rescaled(estimate, (sizes or {}).get(name, size_of(values)), tolerance)
-    return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
+        error = max(
+            _rms(at - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
+            LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
+        )
+        estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
+        told[name] = estimate_rescaled(estimate, (sizes or {}).get(name, size_of(values)), tolerance)
+    return with_stated_errors(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
 def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
-    """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL, at most
+    """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL_SHARE, at most
     ``maximum_cells``."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
-    needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
-    return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS)
+    needed = cells * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / order))
+    return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS_NOTE)
 
 
 def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
@@ -278,7 +286,7 @@ def summed_error(first: Estimate, added_error: Estimate) -> Estimate:
     )
 
 
-def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
+def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: str, step_unit: str = "s") -> Result:
     """The result with the estimated error of each channel and the method of the estimate; ``step_unit``: unit of steps
     or cells.
 
@@ -334,9 +342,9 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
 
 def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
     """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
-    WARNED."""
+    WARNED_SHARE."""
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
-    needed = samples * max(1.0, (share / WARNED) ** 2) if math.isfinite(share) else math.inf
+    needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 
 
@@ -353,17 +361,17 @@ def error_lines(run: Result) -> list[str]:
     shares = {name: estimate.share for name, estimate in sorted(told.items(), key=lambda entry: entry[1].share)}
     worst = {told[name].of: name for name in shares}
     for name in sorted(worst.values(), key=lambda name: -shares[name]):
-        line = f"error at most {_size(name, told[name])}, by {said['how']}"
+        line = f"error at most {_size_text(name, told[name])}, by {said['how']}"
         text.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
     for kind, words in (("theory", "error of the theory"), ("chance", "standard error of {samples} paths")):
         if kind in said:
             name, values = max(said[kind]["channels"].items(), key=lambda entry: entry[1]["share"])
-            line = f"{words.format(**said[kind])} at most {_size(name, Estimate(**values))}"
+            line = f"{words.format(**said[kind])} at most {_size_text(name, Estimate(**values))}"
             text.append(f"{line}, {said[kind]['how']}" if "how" in said[kind] else line)
     return text
 
 
-def _size(name: str, estimate: Estimate) -> str:
+def _size_text(name: str, estimate: Estimate) -> str:
     share, error = (float(f"{value:.2g}") for value in (100.0 * estimate.share, estimate.error))
     size = f"{error:g} {estimate.unit}".rstrip()
     return f"{share:g} % ({name}: {size})"

@@ -30,7 +30,7 @@ class InputError(ValueError):
         self.choices = choices
         where = ": ".join(part for part in (str(file), place) if part)
         name = value if isinstance(value, str) else place.rpartition(".")[2]
-        super().__init__(f"{where}{_value_text(value)}: {allowed}{nearest(name, choices)}")
+        super().__init__(f"{where}{_value_text(value)}: {allowed}{nearest_names_phrase(name, choices)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Arguments for recreating the error in another process."""
@@ -46,7 +46,7 @@ def _value_text(value: Any) -> str:
     return f" = {text if len(text) <= LONGEST_VALUE_TEXT else text[: LONGEST_VALUE_TEXT - 3] + '...'}"
 
 
-def nearest(name: object, choices: tuple[str, ...]) -> str:
+def nearest_names_phrase(name: object, choices: tuple[str, ...]) -> str:
     """Phrase that lists the accepted names and proposes the one most similar to ``name``."""
     if not choices:
         return ""
@@ -54,10 +54,10 @@ def nearest(name: object, choices: tuple[str, ...]) -> str:
     if len(choices) > MOST_NAMES:
         listed = get_close_matches(str(name), choices, n=5, cutoff=0.3) or listed[:5]
         more = f", and {len(choices) - len(listed)} others"
-    return f" (allowed: {', '.join(listed)}{more}){suggestion(name, choices)}"
+    return f" (allowed: {', '.join(listed)}{more}){suggestion_phrase(name, choices)}"
 
 
-def suggestion(name: object, choices: tuple[str, ...]) -> str:
+def suggestion_phrase(name: object, choices: tuple[str, ...]) -> str:
     """Phrase that offers the accepted name most like ``name``, whatever its case; empty if none is."""
     lower = {choice.casefold(): choice for choice in choices}
     match = get_close_matches(str(name).casefold(), lower, n=1, cutoff=0.6)
@@ -70,7 +70,7 @@ def similar_file(path: Path) -> str:
         stems = tuple(p.stem for p in path.parent.iterdir() if p.suffix == path.suffix and p.is_file())
     except OSError:
         return ""
-    return suggestion(path.stem, stems).replace("'?", f"{path.suffix}'?")
+    return suggestion_phrase(path.stem, stems).replace("'?", f"{path.suffix}'?")
 
 
 class RunFailed(RuntimeError):

@@ -30,7 +30,7 @@ class Finding:
     times: tuple[float, ...] = ()
 
 
-def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+def findings_as_dicts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings as plain dicts, for JSON."""
     return [
         {"check": f.check, "weight": f.weight, "place": f.place, "text": f.text, "size": f.size, "unit": f.unit}
@@ -38,12 +38,12 @@ def queries(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     ]
 
 
-def lines(findings: Iterable[Finding]) -> list[str]:
+def finding_lines(findings: Iterable[Finding]) -> list[str]:
     """Text of findings for plans and summaries: one line per finding, or fewer for many of the same kind."""
-    return [f"  {f.weight:<10} {f.text}" for f in gathered(findings)]
+    return [f"  {f.weight:<10} {f.text}" for f in merged_findings(findings)]
 
 
-def gathered(findings: Iterable[Finding]) -> list[Finding]:
+def merged_findings(findings: Iterable[Finding]) -> list[Finding]:
     """The findings. If more than LISTED_FINDINGS share check and severity, only the worst is kept, with the number of
     the others."""
     kinds: dict[tuple[str, str], list[Finding]] = {}

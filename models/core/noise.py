@@ -1,7 +1,7 @@
 """Counter-based noise: any block of any stream can be made alone, in any order, on any worker.
 
-A stream is named by (seed, path, source); its samples are made in blocks of BLOCK that the counter numbers, so
-sample i of path j is the same number whoever asks for it and whatever was asked for before. The source says whose
+A stream is named by (seed, path, source); its samples are made in blocks of SAMPLES_PER_BLOCK that the counter numbers,
+so sample i of path j is the same number whoever asks for it and whatever was asked for before. The source says whose
 noise it is: an engineer who gives one seed to forces and gyro still gets independent noise.
 """
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from models.core.errors import InputError
 
-BLOCK = 4096
+SAMPLES_PER_BLOCK = 4096
 """Samples per block; part of what names a sample, so it never changes."""
 
 
@@ -30,9 +30,10 @@ BLOCK = 4096
 
 
 def normal_block(
-    seed: int, path: int, block: int, channels: int, source: int = FORCES, rows: int = BLOCK
+    seed: int, path: int, block: int, channels: int, source: int = FORCES, rows: int = SAMPLES_PER_BLOCK
 ) -> np.ndarray:
-    """Standard normal samples (rows, channels) of one block, its first: samples BLOCK block and following of a stream.
+    """Standard normal samples (rows, channels) of one block, its first: samples SAMPLES_PER_BLOCK block and following
+    of a stream.
 
     seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
     stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
@@ -50,13 +51,15 @@ def _whole_number(name: str, value: int) -> int:
     return int(value)
 
 
-def normal(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
+def normal_samples(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
     """Standard normal samples (count, channels) of a stream from sample ``first`` on; raises InputError."""
     if min(count, first) < 0:
         raise InputError("", "count, first", (count, first), "must be 0 or more")
-    start, end = first // BLOCK, -(-(first + count) // BLOCK)
+    start, end = first // SAMPLES_PER_BLOCK, -(-(first + count) // SAMPLES_PER_BLOCK)
     blocks = [
-        normal_block(seed, path, block, channels, source, rows=min(BLOCK, first + count - block * BLOCK))
+        normal_block(
+            seed, path, block, channels, source, rows=min(SAMPLES_PER_BLOCK, first + count - block * SAMPLES_PER_BLOCK)
+        )
         for block in range(start, end)
     ]  # what lies behind the last sample is never drawn
-    return np.concatenate(blocks)[first - start * BLOCK :] if blocks else np.empty((0, channels))
+    return np.concatenate(blocks)[first - start * SAMPLES_PER_BLOCK :] if blocks else np.empty((0, channels))

@@ -14,9 +14,9 @@ import numpy as np
 
 from models.core.errors import RunFailed
 
-ALLOWED = 0.08
+ALLOWED_MISSING_SHARE = 0.08
 """Share of the velocities that may be missing in any second."""
-NEGLIGIBLE_VELOCITY, ROUNDING = 1e-6, 1e-9
+NEGLIGIBLE_VELOCITY, ROUNDING_VELOCITY_SHARE = 1e-6, 1e-9
 """m/s of the largest mass, and share of the velocities at the start, below which a motion is none."""
 
 
@@ -33,7 +33,11 @@ def missed_velocity_share(positions: np.ndarray, rates: np.ndarray, step: float,
     way = step / 3.0 * (rates[:-2] + 4.0 * rates[1:-1] + rates[2:])
     each = np.linalg.norm((positions[2:] - positions[:-2] - way) @ root, axis=1) / (2.0 * step)
     whole = np.linalg.norm((rates - rates[0]) @ root, axis=1).max()
-    whole = max(whole, ROUNDING * np.linalg.norm(rates[0] @ root), NEGLIGIBLE_VELOCITY * np.sqrt(mass.diagonal().max()))
+    whole = max(
+        whole,
+        ROUNDING_VELOCITY_SHARE * np.linalg.norm(rates[0] @ root),
+        NEGLIGIBLE_VELOCITY * np.sqrt(mass.diagonal().max()),
+    )
     sums = np.concatenate(([0.0], np.cumsum(each)))
     window = min(len(each), max(1, round(1.0 / step)))
     within = sums[window:] - sums[:-window]
@@ -60,7 +64,7 @@ def check_resolved(
     step = float(times[1] - times[0])
     missed = missed_by_first_order if order == 1 else missed_velocity_share
     share, row = missed(positions, rates, step, mass)
-    if not share <= ALLOWED:
+    if not share <= ALLOWED_MISSING_SHARE:
         raise RunFailed(
             engine,
             f"steps of {step:g} s are too long for this motion: {share:.2g} of its velocity goes "

@@ -20,7 +20,7 @@ from models.core.whole_files import write_whole
 if TYPE_CHECKING:
     import xarray as xr
 
-PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
+RECORDED_PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
 _version = cache(version)
 """Version of an installed package; finding it out takes longer than a short run."""
 
@@ -161,7 +161,7 @@ def join_results(results: Mapping[str, Result], axis: str) -> Result:
     return Result(data)
 
 
-def tabulated(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
+def result_from_table(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
     """A table as a ``Result``: one channel per column along ``axis``. Columns with computing times are left out, since
     they never repeat.
 
@@ -194,17 +194,17 @@ def provenance(command: str = "") -> dict[str, Any]:
     """Versions, machine and commit: what someone needs to repeat a figure."""
     return {
         "twinrig": _version("twinrig"),
-        "commit": _commit(),
-        "versions": {name: _version(name) for name in PACKAGES},
+        "commit": _commit_of_checkout(),
+        "versions": {name: _version(name) for name in RECORDED_PACKAGES},
         "python": platform.python_version(),
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor()}",
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor_name()}",
         "system": f"{platform.system()} {platform.release()}",
         "command": command,
     }
 
 
 @cache
-def _commit() -> str:
+def _commit_of_checkout() -> str:
     """Commit of the checkout that runs, marked if files were changed since."""
     asked = partial(subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True)
     try:
@@ -217,7 +217,7 @@ def _commit() -> str:
 
 
 @cache
-def _processor() -> str:
+def _processor_name() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -9,9 +9,9 @@ from pathlib import Path
 from models.core.errors import InputError
 from models.core.whole_files import DISK_FULL_ERRORS, drop_parts
 
-COMMAND = "command.txt"
+COMMAND_FILE = "command.txt"
 """First file of a folder that the user named: what made the others."""
-RESULTS = Path("results")
+RESULTS_FOLDER = Path("results")
 """Where results go unless the user says otherwise, within the folder in which the command runs."""
 
 
@@ -22,7 +22,7 @@ def new_folder(requested_folder: Path | None, name: str) -> Path:
     get the same folder: it is made, or its first file is, in one step that only one of them can take.
     """
     if requested_folder is None:
-        return next(path for path in _candidates(name) if _make_folder(path))
+        return next(path for path in _candidate_folders(name) if _make_folder(path))
     try:
         if requested_folder.exists() and not requested_folder.is_dir():
             raise InputError("--out", "", str(requested_folder), "is a file: name a folder")
@@ -40,7 +40,7 @@ def resumed_folder(requested_folder: Path, blocks: str) -> Path:
 
     What the run left of files when it was killed is removed.
     """
-    begun = requested_folder.is_dir() and {path.name for path in requested_folder.iterdir()} <= {COMMAND}
+    begun = requested_folder.is_dir() and {path.name for path in requested_folder.iterdir()} <= {COMMAND_FILE}
     if not begun and not (requested_folder / blocks).is_dir():
         allowed = f"holds no unfinished run: name a folder with {blocks!r} in it, or leave out --resume"
         raise InputError("--resume", "", str(requested_folder), allowed)
@@ -51,13 +51,13 @@ def resumed_folder(requested_folder: Path, blocks: str) -> Path:
 def _take_folder(folder: Path) -> bool:
     """Claim the folder by writing the command into it as its first file; False if another run did so before."""
     try:
-        with (folder / COMMAND).open("x", encoding="utf-8", errors="backslashreplace") as file:
+        with (folder / COMMAND_FILE).open("x", encoding="utf-8", errors="backslashreplace") as file:
             file.write(" ".join(sys.argv) + "\n")
     except FileExistsError:
         return False
     except OSError as error:
-        (folder / COMMAND).unlink(missing_ok=True)
-        error.filename = str(folder / COMMAND)
+        (folder / COMMAND_FILE).unlink(missing_ok=True)
+        error.filename = str(folder / COMMAND_FILE)
         raise
     return True
 
@@ -65,17 +65,17 @@ def _take_folder(folder: Path) -> bool:
 def drop_if_empty(folder: Path) -> None:
     """Remove the folder of a run that saved nothing."""
     with suppress(OSError):
-        if [path.name for path in folder.iterdir()] == [COMMAND]:
-            (folder / COMMAND).unlink()
+        if [path.name for path in folder.iterdir()] == [COMMAND_FILE]:
+            (folder / COMMAND_FILE).unlink()
         folder.rmdir()
-        if folder.parent == RESULTS:
-            RESULTS.rmdir()
+        if folder.parent == RESULTS_FOLDER:
+            RESULTS_FOLDER.rmdir()
 
 
-def _candidates(name: str) -> Iterator[Path]:
-    yield RESULTS / name
+def _candidate_folders(name: str) -> Iterator[Path]:
+    yield RESULTS_FOLDER / name
     for i in count(2):
-        yield RESULTS / f"{name}-{i}"
+        yield RESULTS_FOLDER / f"{name}-{i}"
 
 
 def _make_folder(path: Path) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-STAGES = 4
+RK4_STAGES = 4
 """Evaluations of the rates in a step."""
 
 

@@ -39,8 +39,8 @@ class Entry:
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
     adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
     ``Effect``.
-    usual : what the key is where the effect has usual values, None where there are none. An effect that is not the
-    presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
+    usual_value : what the key is where the effect has usual values, None where there are none. An effect that is not
+    the presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
     ``put_in(table, scene)``.
     """
 
@@ -54,7 +54,7 @@ class Entry:
     after: tuple[str, ...] = ()
     modules: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
-    usual: Any = None
+    usual_value: Any = None
     there: Callable[[Any], bool] | None = None
     leave_out: Callable[[Table, Any], None] | None = None
     put_in: Callable[[Table, Any], None] | None = None
@@ -85,7 +85,7 @@ class Entry:
         *above, key = self.place.split(".")
         for name in above:
             table = table.setdefault(name, {})
-        table[key] = deepcopy(self.usual)
+        table[key] = deepcopy(self.usual_value)
 
 
 class Effect:
@@ -120,12 +120,12 @@ def _of_entry(entry: Entry) -> Effect:
     known = {key.upper(): getattr(entry, key) for key in said}
     known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
     known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
-    return Effect(known if entry.usual is None and entry.put_in is None else known | {"put_in": entry.add})
+    return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
 
 
 def names_of(system: str) -> tuple[str, ...]:
     """Names of all effects that scenes of a system may have, found without importing them."""
-    return tuple(sorted({*_files(system), *_table(system)}))
+    return tuple(sorted({*_effect_files(system), *_table(system)}))
 
 
 def _table(system: str) -> Mapping[str, Entry]:
@@ -134,15 +134,15 @@ def _table(system: str) -> Mapping[str, Entry]:
     return getattr(import_module(package), "TABLE", {}) if package else {}
 
 
-def _files(system: str) -> dict[str, Path]:
+def _effect_files(system: str) -> dict[str, Path]:
     package = SYSTEMS[system].effects
     folders = import_module(package).__path__ if package else ()
     return {file.stem: file for folder in folders for file in Path(folder).glob("[!_]*.py")}
 
 
-def listing(system: str) -> dict[str, str]:
+def effect_sentences(system: str) -> dict[str, str]:
     """First sentence about each effect of a system, read from its text without importing it."""
-    says = {name: _first_sentence(file) for name, file in _files(system).items()}
+    says = {name: _first_sentence(file) for name, file in _effect_files(system).items()}
     says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
     return dict(sorted(says.items()))
 
@@ -178,12 +178,16 @@ def module_of(system: str, name: str) -> Any:
 
 def named_effects(scene: Any) -> tuple[str, ...]:
     """Effects that a scene names; effects that only a table can name are not imported for this."""
-    there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
+    there = [
+        name
+        for name, file in _effect_files(scene.system).items()
+        if name in tables_of(scene) or _names_effect(scene, file)
+    ]
     there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
     return tuple(sorted(there))
 
 
-def _names(scene: Any, file: Path) -> bool:
+def _names_effect(scene: Any, file: Path) -> bool:
     """Whether the scene's system tables contain the key that names the effect in this file."""
     return _is_in_own_tables(file) and module_of(scene.system, file.stem).named(scene)
 
@@ -222,7 +226,7 @@ def with_own(scene: Any) -> Any:
     return extended_scene
 
 
-def extended(system_object: Any, scene: Any) -> Any:
+def extended_by_effects(system_object: Any, scene: Any) -> Any:
     """The object that a system built from a scene, extended by the effects in the tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
         system_object = _extend(name, module_of(scene.system, name), system_object, table)
@@ -256,10 +260,10 @@ def _read(name: str, values: Any, system: str, file: str) -> Any:
 
 def check(scene: Any) -> None:
     """Refuse effects that exclude each other or lack an effect that they need; the message gives the remedy."""
-    legal(named_effects(scene), scene)
+    check_combination(named_effects(scene), scene)
 
 
-def legal(present: Iterable[str], scene: Any) -> None:
+def check_combination(present: Iterable[str], scene: Any) -> None:
     """Check that effects of a scene, given by existing names, are allowed together."""
     present = tuple(present)
     for name in present:
@@ -307,16 +311,16 @@ def own_table(scene: Any) -> Table:
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
-def without(scene: Any, *left_out: str) -> Any:
+def scene_without(scene: Any, *left_out: str) -> Any:
     """The scene without the given effects; raises InputError if one cannot be left out, or if another effect needs
     it."""
     table = own_table(scene)
-    for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
+    for name in sorted(left_out, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
         if name in tables_of(scene):
             del table["effects"][name]
         else:
             module_of(scene.system, name).leave_out(table, scene)
-    smaller = _confirmed(rebuilt(table, scene), left_out, False)
+    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out, False)
     needy = [name for name in named_effects(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
     gone = [name for name in needy if name not in (*left_out, *named_effects(smaller))]
     if gone:
@@ -330,10 +334,10 @@ def without(scene: Any, *left_out: str) -> Any:
     return smaller
 
 
-def _depth(name: str, system: str) -> int:
+def _dependency_depth(name: str, system: str) -> int:
     """Length of the longest chain of needed effects that starts at ``name``. Effects are left out before the effects
     that they need."""
-    return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
+    return 1 + max((_dependency_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
 def with_effects(scene: Any, *more: str) -> Any:
@@ -342,10 +346,10 @@ def with_effects(scene: Any, *more: str) -> Any:
     table = own_table(scene)
     for name in more:
         _put_in(table, name, scene)
-    return _confirmed(rebuilt(table, scene), more, True)
+    return _confirmed_scene(rebuilt_scene(table, scene), more, True)
 
 
-def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
+def _confirmed_scene(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
     """The scene, after a check that it names all these effects (``wanted``), or none of them."""
     there = named_effects(scene)
     for name in effects:
@@ -369,14 +373,14 @@ def _put_in(table: Table, name: str, scene: Any) -> None:
         )
 
 
-def rebuilt(table: Table, scene: Any) -> Any:
+def rebuilt_scene(table: Table, scene: Any) -> Any:
     """The scene made from an edited table, after all checks."""
     changed_scene = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
     check(changed_scene)
     return changed_scene
 
 
-def lines(scene: Any, width: int = 10) -> list[str]:
+def effect_lines(scene: Any, width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
     said = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]

@@ -77,19 +77,21 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
     for key in ("file", "folder"):
         if key in table:
             raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
-    checked_scene = read(model, {**_automatic(model, table, file), "file": file, "folder": str(folder)}, file)
+    checked_scene = read(
+        model, {**_table_with_chosen_effects(model, table, file), "file": file, "folder": str(folder)}, file
+    )
     checked_scene.check_choice()
     return checked_scene
 
 
-AUTO = "auto"
+AUTOMATIC_EFFECTS = "auto"
 """What a scene says in place of effects to have them chosen."""
 
 
-def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
+def _table_with_chosen_effects(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
     """The table of a scene with ``effects = "auto"``, rewritten as the study that chooses the effects."""
     plain = dict(table)
-    if plain.get("effects") == AUTO:
+    if plain.get("effects") == AUTOMATIC_EFFECTS:
         del plain["effects"]
         if plain.setdefault("study", model.CHOOSING) != model.CHOOSING:
             raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {model.CHOOSING}')
@@ -114,11 +116,11 @@ def existing(name: str, folder: Path, file: str, place: str) -> Path:
     raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
 
 
-def changed(path: Path, changes: Iterable[str]) -> dict[str, Any]:
+def changed_tables(path: Path, changes: Iterable[str]) -> dict[str, Any]:
     """A TOML file as nested tables, with changes of the form KEY.KEY=VALUE applied on top."""
     table = parse(path)
     for change in changes:
-        _apply(table, change)
+        _set_nested_key(table, change)
     return table
 
 
@@ -141,23 +143,23 @@ def _not_toml(path: Path, error: Exception) -> InputError:
     if not isinstance(error, tomllib.TOMLDecodeError):
         reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
         return InputError(path, "", None, f"not valid TOML: {reason}")
-    what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
+    what, line, column = _ERROR_PLACE_PATTERN.fullmatch(str(error)).groups()  # type: ignore[union-attr]
     if line is None:
         return InputError(path, "", None, f"not valid TOML: {what}")
     text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
     return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
 
 
-_WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
+_ERROR_PLACE_PATTERN = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 
 
-def _apply(table: dict[str, Any], change: str) -> None:
+def _set_nested_key(table: dict[str, Any], change: str) -> None:
     """Set one nested key from KEY.KEY=VALUE; the value is parsed as TOML, and is text if that fails."""
     key, equals, text = (part.strip() for part in change.partition("="))
     if not equals or not all(key.split(".")):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
     at, last = _table_of_key(table, key, text, "--set")
-    at[last] = _value(text)
+    at[last] = _parsed_value(text)
 
 
 def set_key(table: dict[str, Any], key: str, value: Any) -> None:
@@ -184,20 +186,20 @@ def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tup
     *parents, last = key.split(".")
     at: Any = table
     for i, parent in enumerate(parents):
-        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_entry(at, parent, (file, key, value))]
+        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_list_index(at, parent, (file, key, value))]
         if not isinstance(at, dict | list):
             raise InputError(file, key, value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    return at, last if isinstance(at, dict) else _entry(at, last, (file, key, value))
+    return at, last if isinstance(at, dict) else _list_index(at, last, (file, key, value))
 
 
-def _entry(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
+def _list_index(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
     """Index in a list from its text, counted from 0 as in messages; written : file, key and value of the change."""
     if not (number.isdecimal() and int(number) < len(listed)):
         raise InputError(*written, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
     return int(number)
 
 
-def _value(text: str) -> Any:
+def _parsed_value(text: str) -> Any:
     """Value parsed as in a scene file; text may stand without quotes."""
     for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
         try:

@@ -15,7 +15,7 @@ import numpy as np
 from models.core.errors import InputError
 
 Interpolation = Literal["held", "linear", "smooth"]
-SNAP = 1e-6
+SNAP_SHARE = 1e-6
 """Part of a period within which a time is taken for that of a sample."""
 
 
@@ -90,7 +90,7 @@ class Sampled:
 
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step, shape (count, channels)."""
-        index, part = _placed(start, step, count, self.period, len(self.values))
+        index, part = _sample_and_fraction(start, step, count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.core.piecewise import interpolate
@@ -102,7 +102,7 @@ class Sampled:
         that solvers need."""
         position, last = time / self.period, len(self.values) - 1
         nearest = round(position)
-        snapped = nearest if abs(position - nearest) < SNAP else position
+        snapped = nearest if abs(position - nearest) < SNAP_SHARE else position
         row = min(max(math.floor(snapped), 0), last)
         before = self.values[row]
         return before.copy() if self.held else before + (snapped - row) * (self.values[min(row + 1, last)] - before)
@@ -113,12 +113,14 @@ class Sampled:
 
 
 @lru_cache(maxsize=2)
-def _placed(start: float, step: float, count: int, period: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
+def _sample_and_fraction(
+    start: float, step: float, count: int, period: float, samples: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Index of the sample at or before each time start + i step, and the fraction of a period after it; the same for
     all paths of an ensemble."""
     position = (start + step * np.arange(count)) / period
     nearest = np.rint(position)
-    snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
+    snapped = np.where(np.abs(position - nearest) < SNAP_SHARE, nearest, position)
     index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
     part = snapped - index
     index.flags.writeable = part.flags.writeable = False
@@ -184,7 +186,7 @@ class Smooth:
         return np.empty(0)
 
 
-def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
+def signal_from_samples(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
     """Signal from uniform samples, shape (n, channels), interpolated by the rule that a scene names.
 
     Raises InputError for a period or a rule that is none, and for fewer samples than the rule needs: 4, or 1 if held

@@ -6,13 +6,13 @@ import numpy as np
 
 from models.core.errors import InputError
 
-ORDER = 4
+BUTTERWORTH_ORDER = 4
 """Of the Butterworth low-pass, which runs once forward and once backward."""
-PERIODS = 1.0
+LEAST_PERIODS = 1.0
 """Of the cut-off that a record must hold: a straight line then passes to 1 %; with a fiftieth it turned round."""
 
 
-def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
+def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, place: str) -> np.ndarray:
     """Samples (n, columns) filtered by a Butterworth low-pass forward and backward: no delay, half the amplitude at
     ``bandwidth`` (Hz), order eight in total.
 
@@ -29,13 +29,13 @@ def smoothed(values: np.ndarray, period: float, bandwidth: float, file: str, pla
             bandwidth,
             f"must be below {fastest:g} Hz, half the sampling rate of the file: faster motion is not in it",
         )
-    if not bandwidth * length >= PERIODS * (1 - 1e-9):
+    if not bandwidth * length >= LEAST_PERIODS * (1 - 1e-9):
         raise InputError(
             file,
             place,
             bandwidth,
-            f"must be at least {PERIODS / length:.3g} Hz: of slower motion the "
-            f"{length:g} s hold no {PERIODS:g} periods, and what is beyond their ends would be guessed",
+            f"must be at least {LEAST_PERIODS / length:.3g} Hz: of slower motion the "
+            f"{length:g} s hold no {LEAST_PERIODS:g} periods, and what is beyond their ends would be guessed",
         )
     padding = min(len(values) - 1, math.ceil(3 / (bandwidth * period)))
-    return sosfiltfilt(butter(ORDER, bandwidth / fastest, output="sos"), values, axis=0, padlen=padding)
+    return sosfiltfilt(butter(BUTTERWORTH_ORDER, bandwidth / fastest, output="sos"), values, axis=0, padlen=padding)

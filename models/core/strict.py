@@ -6,7 +6,7 @@ from typing import Any, Literal, TypeVar, get_origin
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
-from models.core.errors import InputError, nearest, suggestion
+from models.core.errors import InputError, nearest_names_phrase, suggestion_phrase
 
 
 class Strict(BaseModel):
@@ -19,7 +19,7 @@ Query = Literal["mass", "size", "inertia", "strut", "load", "stiffness", "freque
 """Checks of what a usual vehicle has (``models.vehicles.plausible``)."""
 
 
-def accepted() -> Any:
+def accepted_queries_field() -> Any:
     """Model field for the queries about a vehicle that its user has seen and confirmed."""
     return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
 
@@ -56,28 +56,32 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
 def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
     """One InputError from all faults that pydantic listed."""
     first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    keys = _keys(first)
+    keys = _keys_of_error(first)
     value = None if first["type"] == "missing" else first["input"]
-    said = _phrase(first, keys, _owner(model, keys))
-    rest = [_dotted(place, _keys(fault)) for fault in others if f"mean {_keys(fault)[-1]!r}" not in said]
+    said = _allowed_phrase(first, keys, _owning_model(model, keys))
+    rest = [
+        _dotted_key(place, _keys_of_error(fault))
+        for fault in others
+        if f"mean {_keys_of_error(fault)[-1]!r}" not in said
+    ]
     more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
-    return InputError(file, _dotted(place, keys), value, said + more)
+    return InputError(file, _dotted_key(place, keys), value, said + more)
 
 
-def _keys(fault: Any) -> tuple[str, ...]:
+def _keys_of_error(fault: Any) -> tuple[str, ...]:
     return tuple(str(part) for part in fault["loc"])
 
 
-def _dotted(place: str, keys: tuple[str, ...]) -> str:
+def _dotted_key(place: str, keys: tuple[str, ...]) -> str:
     return ".".join((*((place,) if place else ()), *keys))
 
 
-def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
+def _owning_model(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
     """The model class of the table that holds the last key; None if no class of the project describes it."""
     parents = iter(keys[:-1])
     for key in parents:
         field = model.model_fields.get(key)
-        inner = None if field is None else _inner(field.annotation)
+        inner = None if field is None else _inner_model(field.annotation)
         if field is None or inner is None:
             return None
         if get_origin(field.annotation) in (dict, list):
@@ -86,24 +90,24 @@ def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | N
     return model
 
 
-def _inner(annotation: Any) -> type[BaseModel] | None:
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
     options = (annotation, *getattr(annotation, "__args__", ()))
     return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
+def _allowed_phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
     """Phrase that says which keys or values would have been accepted."""
     fields = {} if owner is None else owner.model_fields
     key = keys[-1] if keys else ""
-    kind, facts = first["type"], _facts(fields.get(key))
+    kind, facts = first["type"], _unit_and_meaning(fields.get(key))
     if kind == "extra_forbidden":
         known = tuple(name for name, field in fields.items() if not field.exclude)
-        return "unknown key" + (nearest(key, known) or ": this table takes none")
+        return "unknown key" + (nearest_names_phrase(key, known) or ": this table takes none")
     if kind == "missing":
         return f"is missing{facts}"
     if kind == "literal_error":
         names = tuple(part.strip().strip("'") for part in first["ctx"]["expected"].replace(" or ", ", ").split(","))
-        return f"must be {' or '.join(names)}{facts}{suggestion(first['input'], names)}"
+        return f"must be {' or '.join(names)}{facts}{suggestion_phrase(first['input'], names)}"
     if kind == "value_error":
         return f"{first['ctx']['error']}{facts}"
     return ERROR_SENTENCES.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
@@ -131,7 +135,7 @@ ERROR_SENTENCES = {
 """What each kind of error of the library means to a person who writes a file."""
 
 
-def _facts(field: FieldInfo | None) -> str:
+def _unit_and_meaning(field: FieldInfo | None) -> str:
     """Text with unit and meaning of a key, in brackets."""
     if field is None:
         return ""

@@ -59,14 +59,14 @@ class System:
         return engines
 
 
-def listed(folder: Path, package: str) -> dict[str, System]:
+def systems_in_folder(folder: Path, package: str) -> dict[str, System]:
     """Systems by their names: all packages within ``folder`` (the package ``package``) that have scenes."""
     places = sorted(path.parent for path in folder.glob("*/scene.py"))
     systems = {place.name.replace("_", "-"): System(f"{package}.{place.name}", place) for place in places}
     return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT_SYSTEM))
 
 
-SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
+SYSTEMS = systems_in_folder(Path(__file__).parents[1] / "systems", "models.systems")
 
 
 def modules_of(package: str) -> dict[str, str]:
@@ -77,11 +77,11 @@ def modules_of(package: str) -> dict[str, str]:
 
 def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:
     """Read a scene file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
-    from models.core.scene_file import changed
+    from models.core.scene_file import changed_tables
 
     changes = list(changes)
     file = path.name + (" with --set" if changes else "")
-    return of_table(changed(path, changes), file, path.parent, systems)
+    return of_table(changed_tables(path, changes), file, path.parent, systems)
 
 
 def of_table(table: Mapping[str, Any], file: str, folder: Path, systems: Mapping[str, System] = SYSTEMS) -> Any:

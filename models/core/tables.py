@@ -36,28 +36,28 @@ RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
 ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665}
 RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
 
-GAPS = ("", "nan")
+GAP_CELLS = ("", "nan")
 """Cells that say that nothing was measured, where that is allowed."""
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 """Marks that text in UTF-16 begins with."""
-HEAD = 100_000
+HEADING_CHARACTERS = 100_000
 """Characters among which the headings of a plain table are."""
 CACHED_TEXTS = 4
 """Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
 
-NUMBER = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
+NUMBER_PATTERN = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
 """A number, its digits before the point, after it and in its exponent."""
-RUN, LEAP = 8, 3.0
+COMPARED_ROWS, LARGEST_LEAP = 8, 3.0
 """Rows before a last one without a line end, and how much further than they it may go on."""
 
-BLOCK = 20_000
+ROWS_PER_BLOCK = 20_000
 """Rows of a block of a long table."""
 
 Columns = Mapping[str, Mapping[str, float]]
 Lines = list[tuple[int, str]]
 
-_HEADING = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+_HEADING_PATTERN = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 
 
 def read_table(
@@ -88,7 +88,7 @@ def read_table(
 
         text = plain_text(path, text, tuple(columns))
     header, rows = _header_and_rows(path, text)
-    names, factors = headings(path, header, columns)
+    names, factors = columns_and_factors(path, header, columns)
     raw = _all_cells(path, text, tuple(gaps and name != increasing for name in names))
     if len(rows) < least:
         raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
@@ -119,7 +119,9 @@ def whole_text(path: str | Path) -> str:
 
 def _is_plain(text: str, columns: Columns) -> bool:
     """Whether the first line of a text has known headings with units, separated by commas, and no cell is quoted."""
-    first = next((line for line in text[:HEAD].split("\n") if line.strip() and not line.startswith("#")), "")
+    first = next(
+        (line for line in text[:HEADING_CHARACTERS].split("\n") if line.strip() and not line.startswith("#")), ""
+    )
     names = [cell.partition("[")[0].strip() for cell in first.split(",")]
     strange = '"' in text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
     return not strange and any(name in columns for name in names)
@@ -132,7 +134,7 @@ def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Line
     used = [(i, line) for i, line in lines if line and not line.startswith("#")]
     if not used:
         raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
-    if not text.endswith("\n") and _cut_off([line for _, line in used]):
+    if not text.endswith("\n") and _last_line_is_cut_off([line for _, line in used]):
         place = f"line {len(lines)}"
         raise InputError(
             path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
@@ -148,7 +150,7 @@ def has_line_end(path: str | Path) -> bool:
         return file.read() in (b"\n", b"")
 
 
-def _cut_off(lines: list[str]) -> bool:
+def _last_line_is_cut_off(lines: list[str]) -> bool:
     """Whether a last line without a line end is incomplete: it lacks a cell or digits, or its value jumps more than in
     the rows before.
 
@@ -158,22 +160,24 @@ def _cut_off(lines: list[str]) -> bool:
     *before, last = [line.rpartition(",") for line in lines]
     if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 3:
         return True
-    numbers = [NUMBER.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
+    numbers = [NUMBER_PATTERN.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
     if None in numbers:
         return True
     *others, cut = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
     fewest = [min(counts) for counts in zip(*others, strict=True)]
     whole = cut[1] >= fewest[1] and cut[2] >= fewest[2] and (fewest[1] > 0 or cut[0] >= fewest[0])
-    value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
+    value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:COMPARED_ROWS]))
     leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
-    leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
+    leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LARGEST_LEAP * max(leaps, default=0.0)
     return not whole or leaping
 
 
-def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+def columns_and_factors(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
     place = f"line {header[0]} (header)"
-    names, factors = zip(*(_heading(path, place, cell, columns) for cell in header[1].split(",")), strict=True)
+    names, factors = zip(
+        *(_column_and_factor(path, place, cell, columns) for cell in header[1].split(",")), strict=True
+    )
     for name in names:
         if names.count(name) > 1:
             raise InputError(path, place, name, "this column appears twice")
@@ -183,9 +187,9 @@ def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tup
     return list(names), list(factors)
 
 
-def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
+def _column_and_factor(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
     """Name and factor to SI of one column heading, such as ``left [mm]``."""
-    match = _HEADING.fullmatch(cell.strip().strip('"'))
+    match = _HEADING_PATTERN.fullmatch(cell.strip().strip('"'))
     name, unit = match.groups() if match else (cell.strip(), None)
     if name not in columns:
         allowed = f"this column is not known; wanted, separated by commas: {_header_wanted(columns)}"
@@ -210,11 +214,11 @@ def _all_cells(path: str | Path, text: str, gaps_allowed: tuple[bool, ...]) -> n
     headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
-        values[i] = _row(path, line, row, headings, gaps_allowed)
+        values[i] = _numbers_of_row(path, line, row, headings, gaps_allowed)
     return values
 
 
-def _row(
+def _numbers_of_row(
     path: str | Path, line_number: int, row: str, headings: list[str], gaps_allowed: tuple[bool, ...]
 ) -> list[float]:
     """The numbers of one row; raises InputError that names its line."""
@@ -224,12 +228,12 @@ def _row(
             path, f"line {line_number}", row.strip(), f"{len(headings)} values are needed, found {len(cells)}"
         )
     return [
-        math.nan if gap and cell.strip().lower() in GAPS else number(path, line_number, title, cell)
+        math.nan if gap and cell.strip().lower() in GAP_CELLS else finite_number(path, line_number, title, cell)
         for title, cell, gap in zip(headings, cells, gaps_allowed, strict=True)
     ]
 
 
-def number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
+def finite_number(path: str | Path, line_number: int, heading: str, cell: str) -> float:
     """One finite number; Python's extensions (1_000, non-Latin digits) do not count as numbers."""
     try:
         value = float(cell) if cell.isascii() and "_" not in cell else math.nan
@@ -255,44 +259,44 @@ class RowBlock:
     """Successive rows of a table.
 
     lines : (rows,) line of the file, counted from 1. values : name -> (rows,) in SI, NaN throughout a wrong row.
-    wrong : row of the block -> what is wrong with it.
+    faulty_rows : row of the block -> what is wrong with it.
     """
 
     lines: list[int]
     values: dict[str, np.ndarray]
-    wrong: dict[int, str]
+    faulty_rows: dict[int, str]
 
 
-def blocks(path: Path, columns: tuple[Columns, ...], rows: int = BLOCK) -> Iterator[RowBlock]:
+def table_blocks(path: Path, columns: tuple[Columns, ...], rows: int = ROWS_PER_BLOCK) -> Iterator[RowBlock]:
     """Blocks of at most ``rows`` rows of a CSV table.
 
     columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
     and their factors to SI. Raises InputError for a file or a header that cannot be used.
     """
-    with _opened(path) as file:
+    with _opened_text(path) as file:
         lines = ((i, line) for i, line in enumerate(file, start=1) if line.strip() and not line.startswith("#"))
         header = next(lines, None)
         if header is None:
             raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
-        names, factors = headings(path, (header[0], header[1].strip()), _nearest(header[1], columns))
+        names, factors = columns_and_factors(path, (header[0], header[1].strip()), _nearest_columns(header[1], columns))
         while part := list(itertools.islice(lines, rows)):
-            yield _block(path, part, names, np.array(factors), header[1].split(","))
+            yield _row_block(path, part, names, np.array(factors), header[1].split(","))
 
 
-def _opened(path: Path) -> TextIO:
+def _opened_text(path: Path) -> TextIO:
     try:
         return path.open(encoding="utf-8-sig", errors="replace")  # a byte that is no text spoils its row alone
     except OSError as error:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
 
 
-def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
+def _nearest_columns(header: str, columns: tuple[Columns, ...]) -> Columns:
     """The set of columns that has most names in common with the header."""
     in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
     return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
-def _block(
+def _row_block(
     path: Path, block: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]
 ) -> RowBlock:
     lines, wrong = [line for line, _ in block], {}
@@ -301,7 +305,7 @@ def _block(
         values = np.full((len(block), len(names)), np.nan)
         for i, (line, text) in enumerate(block):
             try:
-                values[i] = _row(path, line, text, titles, (False,) * len(titles))
+                values[i] = _numbers_of_row(path, line, text, titles, (False,) * len(titles))
             except InputError as error:
                 wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
     values = values * factors

@@ -8,7 +8,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table, write_table
 
-MARK = 1e28
+MISSING_VALUE_MARK = 1e28
 """SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
 
 SHORT_TIME_SHARE = 100.0
@@ -43,7 +43,7 @@ def other_unit(lasts: float, needed: float) -> str:
     return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
 
 
-def sparse(count: int, period: float, needed: float, needed_period: float = WHEEL_SAMPLE_TIME) -> str:
+def sparse_record_warning(count: int, period: float, needed: float, needed_period: float = WHEEL_SAMPLE_TIME) -> str:
     """Warning that nearly all of ``count`` samples, ``period`` (s) apart, lie beyond the needed time (s), and are too
     far apart to resolve the motion (``needed_period``, s): their times may be in another unit. "" otherwise."""
     lasts = period * (count - 1)
@@ -59,7 +59,7 @@ def sparse(count: int, period: float, needed: float, needed_period: float = WHEE
 
 def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
     """Refuse the special numbers that some exporters write for missing values."""
-    marks = np.flatnonzero(np.abs(values) > MARK)
+    marks = np.flatnonzero(np.abs(values) > MISSING_VALUE_MARK)
     if len(marks):
         raise InputError(
             path,

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from models.core.assumptions import BrokenAssumption, assumed_of, broken_of
-from models.core.discretisation import WARNED, error_lines, errors_of, stated, worst_of
+from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, with_stated_errors, worst_of
 from models.core.result import Result
 
 LISTED_RESULTS = 4
@@ -16,12 +16,12 @@ Results = Mapping[str, Result]
 """Results of one command by what tells them apart, such as the engine."""
 
 
-def lines(results: Results) -> list[str]:
+def message_lines(results: Results) -> list[str]:
     """Lines for the screen: errors first, then broken assumptions, each listed once with the results that broke it."""
-    return [*_errors(results), *(f"  {names}: {breach.line()}" for names, breach in breaches(results))]
+    return [*_error_lines(results), *(f"  {names}: {breach.line()}" for names, breach in worst_breaches(results))]
 
 
-def _errors(results: Results) -> list[str]:
+def _error_lines(results: Results) -> list[str]:
     if len(results) <= LISTED_RESULTS:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
     untold: dict[str, list[str]] = {}
@@ -35,7 +35,7 @@ def _errors(results: Results) -> list[str]:
     largest = max(worst, key=lambda name: worst[name].share)
     warned = [name for name, estimate in worst.items() if estimate.warned]
     more = (
-        [f"  errors above {100.0 * WARNED:g} % in {len(warned)} of {len(worst)}: {_list_of_few(warned)}"]
+        [f"  errors above {100.0 * WARNED_SHARE:g} % in {len(warned)} of {len(worst)}: {_list_of_few(warned)}"]
         if warned[1:]
         else []
     )
@@ -49,7 +49,7 @@ def _list_of_few(names: list[str]) -> str:
     )
 
 
-def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
+def worst_breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
     """Broken assumptions: for each name the worst violation over all results, and the names of the results that broke
     it."""
     where: dict[str, list[str]] = {}
@@ -62,17 +62,17 @@ def breaches(results: Results) -> list[tuple[str, BrokenAssumption]]:
     return [(_list_of_few(where[name]), breach) for name, breach in worst.items()]
 
 
-def remarks(results: Results) -> list[str]:
+def figure_remarks(results: Results) -> list[str]:
     """Short lines for figures: warnings about errors, and broken assumptions."""
     steps = [
         f"{name}: {error_lines(run)[0]}"
         for name, run in results.items()
         if (worst := worst_of(run)) is not None and worst.warned
     ]
-    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in breaches(results))]
+    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results))]
 
 
-def gathered(joined: Result, parts: Results) -> Result:
+def joined_result(joined: Result, parts: Results) -> Result:
     """A result that joins other results, with the errors that each of them states and all assumptions that any of them
     broke."""
     said = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
@@ -84,7 +84,7 @@ def gathered(joined: Result, parts: Results) -> Result:
     }
     joined.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
     assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
-    kept = [replace(breach, where=f"{names}, {breach.where}") for names, breach in breaches(parts)]
+    kept = [replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(parts)]
     joined.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in kept]}
     )
@@ -93,39 +93,42 @@ def gathered(joined: Result, parts: Results) -> Result:
     return joined
 
 
-def inherited(derived: Result, results: Results, method: str) -> Result:
+def derived_result(derived: Result, results: Results, method: str) -> Result:
     """A result derived from others, with the errors of the sources and the assumptions that they broke; ``method`` :
     text on how errors carry over.
 
     Without estimates in the results it has none.
     """
     assumed = [says for run in results.values() for says in assumed_of(run)]
-    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(breach) for _, breach in breaches(results)]}
+    told = {
+        "assumed": list(dict.fromkeys(assumed)),
+        "broken": [asdict(breach) for _, breach in worst_breaches(results)],
+    }
     derived.data.attrs["assumptions"] = json.dumps(told)
     if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
         derived.data.attrs["status"] += ", assumptions broken"
     pairs = [pair for run in results.values() for pair in errors_of(run).items()]
     worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
-    return stated(derived, worst, method) if worst else derived
+    return with_stated_errors(derived, worst, method) if worst else derived
 
 
 def as_json(results: Results) -> dict[str, Any]:
     """Entries "errors" and "assumptions" of a summary, from the statements of each result; NaN becomes None."""
     return {
-        "errors": {name: _plain(run, "error") for name, run in results.items()},
+        "errors": {name: _json_attribute(run, "error") for name, run in results.items()},
         "assumptions": {
-            name: {"assumed": [], "broken": [], **_plain(run, "assumptions")} for name, run in results.items()
+            name: {"assumed": [], "broken": [], **_json_attribute(run, "assumptions")} for name, run in results.items()
         },
     }
 
 
-def summarised(summary: dict[str, Any]) -> dict[str, Any]:
+def summary_with_errors(summary: dict[str, Any]) -> dict[str, Any]:
     """The summary of a study, with the errors and broken assumptions of its "results" added as text at the end."""
     results = summary.pop("results", {})
-    return summary | as_json(results) | {"table": [*summary.get("table", []), *lines(results)]}
+    return summary | as_json(results) | {"table": [*summary.get("table", []), *message_lines(results)]}
 
 
-def _plain(run: Result, key: str) -> dict[str, Any]:
+def _json_attribute(run: Result, key: str) -> dict[str, Any]:
     """Attribute of a result, parsed from JSON, with None in place of NaN and infinity."""
     said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
     return said
@@ -135,13 +138,13 @@ DOUBT_ATTRIBUTES = ("engine", "error", "assumptions")
 """Attributes by which a result says what it must be doubted for."""
 
 
-def attributes(results: Results) -> dict[str, dict[str, str]]:
-    """Attributes of results, without their channels, for JSON; ``speaking`` is the inverse."""
+def attributes_for_json(results: Results) -> dict[str, dict[str, str]]:
+    """Attributes of results, without their channels, for JSON; ``results_with_attributes`` is the inverse."""
     return {name: {key: run.data.attrs[key] for key in DOUBT_ATTRIBUTES} for name, run in results.items()}
 
 
-def speaking(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
-    """Results without channels that have the given attributes; inverse of ``attributes``."""
+def results_with_attributes(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
+    """Results without channels that have the given attributes; inverse of ``attributes_for_json``."""
     import xarray as xr
 
     return {name: Result(xr.Dataset(attrs=said)) for name, said in attributes.items()}

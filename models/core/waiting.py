@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-MARCHES: list[Callable[[], float]] = []
+SHARES_OF_MARCHES: list[Callable[[], float]] = []
 """Shares of the marches that are under way, the innermost last."""
 
 
@@ -11,8 +11,8 @@ MARCHES: list[Callable[[], float]] = []
 def marching(share: Callable[[], float]) -> Iterator[None]:
     """Context of a running simulation; share : function that returns the completed fraction, 0 to 1. Another thread may
     call it at any time."""
-    MARCHES.append(share)
+    SHARES_OF_MARCHES.append(share)
     try:
         yield
     finally:
-        MARCHES.remove(share)
+        SHARES_OF_MARCHES.remove(share)

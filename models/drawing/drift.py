@@ -10,31 +10,35 @@ from matplotlib.ticker import NullLocator
 
 from models.core.told import Results
 from models.drawing.figures import (
-    BAD,
+    ACCEPTED_COLOUR,
     BLUE,
     COLUMN_WIDTH,
-    DOUBTFUL,
-    GOOD,
+    DOUBTFUL_COLOUR,
     GREY,
+    REJECTED_COLOUR,
     SMALL_TEXT,
     VERMILION,
     about_one,
-    heading,
+    add_heading,
     legend_below,
     subplots,
 )
-from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
+from models.drift.score import JUDGED_BAND, SECTION_FORCE_CHANNELS, TUMBLING_PITCH, Limits
 
 Row = dict[str, Any]
 
-ROADS = {"road": ("on the road", BLUE), "grade": ("on the grade", VERMILION)}
-VERDICT_SIGNS = {"accepted": ("✓", GOOD), "stabilise": ("~", DOUBTFUL), "rejected": ("✗", BAD)}
+ROAD_LABELS = {"road": ("on the road", BLUE), "grade": ("on the grade", VERMILION)}
+VERDICT_SIGNS = {
+    "accepted": ("✓", ACCEPTED_COLOUR),
+    "stabilise": ("~", DOUBTFUL_COLOUR),
+    "rejected": ("✗", REJECTED_COLOUR),
+}
 """Sign and colour of a verdict."""
-MARKS = dict(zip(CHANNELS, ("o", "s", "^", "D"), strict=True))
-NAMES = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
-DAMAGE, PITCH, SHARE = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
+CHANNEL_MARKERS = dict(zip(SECTION_FORCE_CHANNELS, ("o", "s", "^", "D"), strict=True))
+CHANNEL_LABELS = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
+DAMAGE_AXIS, PITCH_AXIS, MOMENT_SHARE_AXIS = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
 """What the axes show; a mark at an edge lies beyond it."""
-TICKS = (0.01, 0.5, 0.9, 1.1, 2.0, 100.0)
+DAMAGE_TICKS = (0.01, 0.5, 0.9, 1.1, 2.0, 100.0)
 
 
 def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
@@ -46,25 +50,34 @@ def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
     axis.set_title("Magnitude of the pitch error [rad]")
 
 
-def decision(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
+def decision_figure(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
     """Figure with one line per method: damage, pitch error, artificial moment, both verdicts, and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (2.5, 1.25, 1.25, 1.5)
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
     for row in rows:
-        _marks(axes, row, methods.index(row["method"]))
+        _draw_run(axes, row, methods.index(row["method"]))
     right = (1 - limits.damage_error, 1 + limits.damage_error)
-    _panel(axes[0], DAMAGE, "pseudo-damage of the section forces\nin the chassis' axes / true one [-]", right)
-    _panel(axes[1], PITCH, "largest pitch error\n[rad] (dotted:\ntumbled)", (PITCH[0], limits.pitch_error))
-    _panel(axes[2], SHARE, f"added moment /\nI pitch'' [-],\nrms to {BAND:g} Hz", (SHARE[0], limits.artificial_share))
-    about_one(axes[0], "x", TICKS)
-    axes[0].set_xlim(*DAMAGE)
-    axes[1].axvline(TUMBLED, color=BAD, linewidth=0.8, linestyle=":")
+    _prepare_panel(
+        axes[0], DAMAGE_AXIS, "pseudo-damage of the section forces\nin the chassis' axes / true one [-]", right
+    )
+    _prepare_panel(
+        axes[1], PITCH_AXIS, "largest pitch error\n[rad] (dotted:\ntumbled)", (PITCH_AXIS[0], limits.pitch_error)
+    )
+    _prepare_panel(
+        axes[2],
+        MOMENT_SHARE_AXIS,
+        f"added moment /\nI pitch'' [-],\nrms to {JUDGED_BAND:g} Hz",
+        (MOMENT_SHARE_AXIS[0], limits.artificial_share),
+    )
+    about_one(axes[0], "x", DAMAGE_TICKS)
+    axes[0].set_xlim(*DAMAGE_AXIS)
+    axes[1].axvline(TUMBLING_PITCH, color=REJECTED_COLOUR, linewidth=0.8, linestyle=":")
     axes[0].set_yticks(range(len(methods)), methods)
     axes[0].set_ylim(len(methods) - 0.5, -0.5)
-    _verdicts(axes[3], rows, methods)
-    _legend(figure, grade)
-    heading(
+    _draw_verdicts(axes[3], rows, methods)
+    _draw_legend(figure, grade)
+    add_heading(
         figure,
         f"Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces ({rows[0]['engine']})",
         results,
@@ -72,28 +85,31 @@ def decision(rows: list[Row], limits: Limits, grade: float | None, results: Resu
     return figure
 
 
-def _marks(axes: Any, row: Row, line: int) -> None:
+def _draw_run(axes: Any, row: Row, line: int) -> None:
     """Draw the marks of one run; those of the run on a grade are slightly lower."""
-    _, colour = ROADS[row["road"]]
+    _, colour = ROAD_LABELS[row["road"]]
     y = line + (0.17 if row["road"] == "grade" else -0.17)
-    for channel, mark in MARKS.items():
+    for channel, mark in CHANNEL_MARKERS.items():
         if row[f"damage {channel}"] is not None:
-            place = np.clip(row[f"damage {channel}"], *DAMAGE)
+            place = np.clip(row[f"damage {channel}"], *DAMAGE_AXIS)
             axes[0].plot(place, y, mark, color=colour, markersize=4, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
         told = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
         axes[0].text(1.0, y, told, color=colour, fontsize=SMALL_TEXT, ha="center", va="center")
-    for axis, name, span in ((axes[1], "pitch error max [rad]", PITCH), (axes[2], "moment share to 15 Hz", SHARE)):
+    for axis, name, span in (
+        (axes[1], "pitch error max [rad]", PITCH_AXIS),
+        (axes[2], "moment share to 15 Hz", MOMENT_SHARE_AXIS),
+    ):
         axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=4, clip_on=False)
 
 
-def _panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
+def _prepare_panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
     axis.set(xscale="log", xlim=span, xlabel=title)
-    axis.axvspan(*good, color=GOOD, alpha=0.16, linewidth=0)
+    axis.axvspan(*good, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0)
     axis.grid(axis="y", alpha=0.25)
 
 
-def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
+def _draw_verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     """Draw symbols for the verdicts with and without the true run, per road, and the cost."""
     axis.set_xlim(0, 10)
     axis.axis("off")
@@ -102,7 +118,7 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     for (road, key), x in places.items():
         name = "by damage" if key == "verdict" else "without truth"
         where = "road" if road == "road" else "grade"
-        style = {"fontsize": SMALL_TEXT, "va": "bottom", "ha": "center", "rotation": 90, "color": ROADS[road][1]}
+        style = {"fontsize": SMALL_TEXT, "va": "bottom", "ha": "center", "rotation": 90, "color": ROAD_LABELS[road][1]}
         axis.text(x, -0.75, f"{where}, {name}", **style)
     axis.text(8.9, -0.75, "seconds / free", fontsize=SMALL_TEXT, va="bottom", ha="center", rotation=90)
     free = next(row["seconds"] for row in rows if row["method"] == "free")
@@ -116,19 +132,19 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
             axis.text(9.9, line, f"{row['seconds'] / free:.1f}", va="center", ha="right", fontsize=8)
 
 
-def _legend(figure: Any, grade: float | None) -> None:
+def _draw_legend(figure: Any, grade: float | None) -> None:
     """Draw the legend of marks and roads below the figure."""
     marks = [
-        Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=NAMES[channel])
-        for channel, mark in MARKS.items()
+        Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=CHANNEL_LABELS[channel])
+        for channel, mark in CHANNEL_MARKERS.items()
     ]
     words = {"road": "on the road as it is", "grade": f"on the same road with a grade of {grade or 0:g} rad"}
     roads = [
-        Line2D([], [], marker="o", linestyle="", color=ROADS[road][1], label=word)
+        Line2D([], [], marker="o", linestyle="", color=ROAD_LABELS[road][1], label=word)
         for road, word in words.items()
         if road == "road" or grade is not None
     ]
-    good = Rectangle((0, 0), 1, 1, color=GOOD, alpha=0.16, label="within the limits")
+    good = Rectangle((0, 0), 1, 1, color=ACCEPTED_COLOUR, alpha=0.16, label="within the limits")
     signs = [
         Line2D([], [], marker="s", linestyle="", color=colour, markersize=5, label=f"{sign} {word}")
         for word, (sign, colour) in VERDICT_SIGNS.items()
@@ -144,24 +160,24 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
     """
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
-        name, colour = ROADS[road]
+        name, colour = ROAD_LABELS[road]
         axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring {name}")
         axes[0].loglog(curve[:, 0], curve[:, 2], "o", color=colour, markersize=4, label=f"high-pass {name}")
-        held = curve[:, 1] < TUMBLED
+        held = curve[:, 1] < TUMBLING_PITCH
         axes[1].loglog(curve[held, 0], curve[held, 3], "o-", color=colour, markersize=4)
         tumbled = curve[~held, 0]
-        axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles {name}")
+        axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE_AXIS[1]), "x", color=colour, label=f"tumbles {name}")
     low = limits.pitch_error / 2
-    axes[0].axhspan(low, limits.pitch_error, color=GOOD, alpha=0.16, linewidth=0, label="allowed")
-    axes[1].axhspan(1 - limits.damage_error, 1 + limits.damage_error, color=GOOD, alpha=0.3, linewidth=0)
+    axes[0].axhspan(low, limits.pitch_error, color=ACCEPTED_COLOUR, alpha=0.16, linewidth=0, label="allowed")
+    axes[1].axhspan(1 - limits.damage_error, 1 + limits.damage_error, color=ACCEPTED_COLOUR, alpha=0.3, linewidth=0)
     axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
-    axes[1].set(ylim=(None, 1.5 * DAMAGE[1]), title="Damage of the worst section force / true [-]")
+    axes[1].set(ylim=(None, 1.5 * DAMAGE_AXIS[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
         axis.axvline(level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
-            lambda k: np.sqrt(np.maximum(k, 0.0) / level.resisting) / (2 * math.pi),
-            lambda f: level.resisting * (2 * math.pi * f) ** 2,
+            lambda k: np.sqrt(np.maximum(k, 0.0) / level.pitch_inertia) / (2 * math.pi),
+            lambda f: level.pitch_inertia * (2 * math.pi * f) ** 2,
         )
         above = axis.secondary_xaxis("top", functions=turning)
         above.set_xlabel("cut-off of the equivalent high-pass [Hz]")
@@ -173,5 +189,5 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
         else f"no stiffness is right, least of all on a grade of {grade:g} rad"
     )
     legend_below(figure, *axes, columns=3)
-    heading(figure, f"Keeping the pitch near zero: {why}")
+    add_heading(figure, f"Keeping the pitch near zero: {why}")
     return figure

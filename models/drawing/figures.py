@@ -22,7 +22,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.scale import LogScale, register_scale
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullLocator
 
-from models.core.told import Results, remarks
+from models.core.told import Results, figure_remarks
 from models.core.whole_files import whole_file
 
 COLUMN_WIDTH = 8.0
@@ -36,11 +36,11 @@ DARK, BLUE, VERMILION, GREEN = "#222222", "#0072b2", "#d55e00", "#009e73"
 PINK, ORANGE, SKY, YELLOW = "#cc79a7", "#e69f00", "#56b4e9", "#f0e442"
 GREY, PALE = "#767676", "#b5b5b5"
 """Colours that eyes of every kind tell apart (Okabe and Ito, 2008), and what is no curve of its own."""
-TURNS = (BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, DARK, GREY)
+CURVE_COLOURS = (BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, DARK, GREY)
 """Colours of curves that have none of their own, in turn."""
-TRUTH, MEASURED = DARK, PALE
+TRUTH_COLOUR, MEASURED_COLOUR = DARK, PALE
 """What is true, and what was measured, beside what was computed."""
-GOOD, DOUBTFUL, BAD = "#00795a", "#a86400", "#b00020"
+ACCEPTED_COLOUR, DOUBTFUL_COLOUR, REJECTED_COLOUR = "#00795a", "#a86400", "#b00020"
 """Words and bands of a verdict: accepted or within the limit, in between, rejected or broken."""
 
 
@@ -65,7 +65,7 @@ rcParams.update(
         "savefig.dpi": 150,
         "font.size": 8.5,
         "axes.titlesize": TITLE_TEXT,
-        "axes.prop_cycle": cycler(color=TURNS),
+        "axes.prop_cycle": cycler(color=CURVE_COLOURS),
         "figure.titlesize": 10.5,
         "figure.labelsize": 8.5,
         "legend.fontsize": 8,
@@ -84,32 +84,32 @@ rcParams.update(
 )
 
 
-REMARK = 8
+REMARK_FONT_SIZE = 8
 """Size (points) of remarks."""
-LETTER = 0.6
+LETTER_WIDTH = 0.6
 """Width of a letter by its size, of bold ones; of others a tenth less."""
 
 
-def wrapped(text: str, inches: float, size: float) -> str:
+def wrapped_text(text: str, inches: float, size: float) -> str:
     """Text split into lines that fit into a width (inches) at a font size (points)."""
-    most = max(int(72 * inches / (LETTER * size)), 8)
+    most = max(int(72 * inches / (LETTER_WIDTH * size)), 8)
     return "\n".join("\n".join(wrap(line, most, break_long_words=False)) for line in text.split("\n"))
 
 
-def heading(figure: Figure, title: str, results: Results | None = None) -> None:
+def add_heading(figure: Figure, title: str, results: Results | None = None) -> None:
     """Add a title above the figure's left edge, and below the figure the warnings and doubts about its results."""
     size, wide = rcParams["figure.titlesize"], figure.get_figwidth()
-    figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
-    if told := remarks(results or {}):
-        broken = wrapped("\n".join(told), 1.12 * wide, REMARK)
+    figure.suptitle(wrapped_text(title, wide, size), x=0.01, ha="left", fontweight="bold")
+    if told := figure_remarks(results or {}):
+        broken = wrapped_text("\n".join(told), 1.12 * wide, REMARK_FONT_SIZE)
         figure.set_figheight(
-            figure.get_figheight() + 1.2 * REMARK / 72 * (1 + broken.count("\n"))
+            figure.get_figheight() + 1.2 * REMARK_FONT_SIZE / 72 * (1 + broken.count("\n"))
         )  # panels keep theirs
         lines = "\n".join((broken, *[" "] * _lines_of_legends(figure)))
-        figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color=BAD)
+        figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK_FONT_SIZE, color=REJECTED_COLOUR)
 
 
-def drawing(size: tuple[float, float] | None = None) -> Figure:
+def empty_figure(size: tuple[float, float] | None = None) -> Figure:
     """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
     import and keeps every figure until it is closed."""
     figure = Figure(figsize=size)
@@ -121,7 +121,7 @@ def subplots(
     rows: int = 1, columns: int = 1, figsize: tuple[float, float] | None = None, **more: Any
 ) -> tuple[Figure, Any]:
     """A figure with panels in rows and columns; figsize : inches; more : as for matplotlib's ``Figure.subplots``."""
-    figure = drawing(figsize)
+    figure = empty_figure(figsize)
     return figure, figure.subplots(rows, columns, **more)
 
 
@@ -129,7 +129,7 @@ def subplot_mosaic(
     places: Sequence[Sequence[str]], figsize: tuple[float, float] | None = None, **more: Any
 ) -> tuple[Figure, dict[str, Axes]]:
     """A figure with panels by their names in rows of ``places``; more : as for ``Figure.subplot_mosaic``."""
-    figure = drawing(figsize)
+    figure = empty_figure(figsize)
     return figure, figure.subplot_mosaic([list(row) for row in places], **more)
 
 
@@ -161,7 +161,7 @@ def _lines_of_legends(figure: Figure) -> int:
     """Height of the legends below a figure's axes, in lines of a remark."""
     tops = [legend.get_window_extent().y1 for legend in figure.legends]
     lowest = max((top for top in tops if top < figure.bbox.height / 2), default=0.0)
-    return int(np.ceil(lowest / (1.2 * REMARK * figure.dpi / 72)))
+    return int(np.ceil(lowest / (1.2 * REMARK_FONT_SIZE * figure.dpi / 72)))
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -178,20 +178,25 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-SHARP = 0.05
-"""Ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, where a tenth is told, logarithmic far from it."""
+RATIO_SHARPNESS = 0.05
+"""Ratios are drawn as asinh(ln(ratio) / RATIO_SHARPNESS): linear about 1, where a tenth is told, logarithmic far from
+it.
+"""
 
 
 def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
     """Scale an axis (x or y) for ratios, so that both 5 % and several decades are visible; ticks : the ratios to be
     marked."""
-    scale = (lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u)))
+    scale = (
+        lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / RATIO_SHARPNESS),
+        lambda u: np.exp(RATIO_SHARPNESS * np.sinh(u)),
+    )
     getattr(axis, f"set_{axis_name}scale")("function", functions=scale)
     getattr(axis, f"set_{axis_name}ticks")(ticks, [f"{tick:g}" for tick in ticks])
     getattr(axis, f"{axis_name}axis").set_minor_locator(NullLocator())
 
 
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MANY_DECADES = 2.0
 """Decades on an axis from which on only whole powers of ten are marked."""
 DECADE_MARKS = ("", "2", "4")
@@ -215,7 +220,7 @@ class _Powers(LogFormatterSciNotation):
             return ""
         if _spans_few_decades(low, high) and 1e-3 <= x < 1e5:
             return f"{x:g}"
-        return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(RAISED)}"
+        return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(SUPERSCRIPTS)}"
 
 
 class _Between(LogLocator):

@@ -9,13 +9,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from models.core.errors import InputError
-from models.core.noise import GYRO, normal
+from models.core.noise import GYRO, normal_samples
 from models.core.result import Result
-from models.drift.score import CHANNELS, section_forces
+from models.drift.score import SECTION_FORCE_CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
-from models.sensors.inertial_unit import bias
+from models.sensors.inertial_unit import bias_path
 
-NODES = 41
+ANGLE_NODES = 41
 """Constant angle errors at which damage is counted; an odd number, so that one of them is zero."""
 EVEN_SPACING_ANGLE = 1e-3
 """rad; below it the nodes are evenly spaced, above it their spacing grows with the angle."""
@@ -33,17 +33,17 @@ def unit_paths(samples: int, rate: int, length: int, correlation_time: float, se
     """
     walks, drifts = list[np.ndarray](), list[np.ndarray]()
     for path in range(samples):
-        noise = normal(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
-        wander = bias(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
+        noise = normal_samples(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
+        wander = bias_path(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
         for paths, part in ((walks, noise), (drifts, wander)):
             paths.append(np.concatenate([[0.0], part.reshape(length, rate).sum(axis=1).cumsum()]))
     return np.array(walks), np.array(drifts)
 
 
-def damages(result: Result, error: float) -> list[float]:
+def damage_at_angle_errors(result: Result, error: float) -> list[float]:
     """Pseudo-damage of each section force of a run whose pitch is wrong by a constant error (rad)."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"] + error)
-    return [pseudo_damage(repeated(forces[name])) for name in CHANNELS]
+    return [pseudo_damage(rotated_to_maximum(forces[name])) for name in SECTION_FORCE_CHANNELS]
 
 
 def log_damage_over_pitch_error(result: Result, reach: float, file: str = "") -> CubicSpline:
@@ -53,16 +53,16 @@ def log_damage_over_pitch_error(result: Result, reach: float, file: str = "") ->
     Raises InputError, which names the scene's file, for a run without damage.
     """
     widest = np.arcsinh(reach / EVEN_SPACING_ANGLE)
-    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, NODES))
-    damage = np.array([damages(result, angle) for angle in angles])
-    true = damage[NODES // 2]
+    angles = EVEN_SPACING_ANGLE * np.sinh(np.linspace(-widest, widest, ANGLE_NODES))
+    damage = np.array([damage_at_angle_errors(result, angle) for angle in angles])
+    true = damage[ANGLE_NODES // 2]
     if not (true > 0).all():
         allowed = "leaves no damage in the section forces to compare with: use a road that moves the vehicle"
         raise InputError(file, "effects.road", None, allowed)
     return CubicSpline(angles, np.log(damage / true))
 
 
-def repeated(load: np.ndarray) -> np.ndarray:
+def rotated_to_maximum(load: np.ndarray) -> np.ndarray:
     """The load (n,) rotated so that it begins and ends at its largest value, as in one of many repetitions (ASTM
     E1049-85, 5.4.5).
 

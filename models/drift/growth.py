@@ -21,17 +21,17 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.pitch_plane import Parameters
 
-CUTOFF = 0.2
+FAST_PITCH_FREQUENCY = 0.2
 """Frequency (Hz) above which a pitch rate counts as fast: 1.3 rad/s, three times the largest growth rate of the study
 roads, for an average over a motion means something only where the error hardly grows meanwhile. Half of it or twice
 as much changes the growth rate of these roads by 1 to 3 %."""
-SERIES = 0.1
+SERIES_LIMIT = 0.1
 """Below this 2 lambda t the sinh law is summed as a series, which loses no digit."""
 LARGEST_EXPONENT = 710.0
 """From about this 2 lambda t on, sinh is beyond all numbers."""
 SMALLEST_POSITIVE = 1e-300
 """What counts as above 0 (rad^2/s^3, rad)."""
-MEDIAN = 0.6744897501960817
+MEDIAN_OF_NORMAL = 0.6744897501960817
 """Median of |x| of a normal x, by its standard deviation."""
 
 
@@ -39,37 +39,38 @@ MEDIAN = 0.6744897501960817
 class RigidPitch:
     """Pitch of the rigid vehicle about the common centre of mass.
 
-    front, rear : arms of the wheel forces (m); inertia : I of the chassis; carried : J of the wheels (kg m^2);
+    front_arm, rear_arm : arms of the wheel forces (m); inertia : I of the chassis; wheel_inertia : J of the wheels (kg
+    m^2);
     mass : of everything, kg; coupling : c = b m1 - a m2, kg m, which moves the chassis' heave by (c/M) per rad.
     """
 
-    front: float
-    rear: float
+    front_arm: float
+    rear_arm: float
     inertia: float
-    carried: float
+    wheel_inertia: float
     mass: float
     coupling: float
 
     @property
-    def total(self) -> float:
+    def total_inertia(self) -> float:
         """Total pitch inertia I + J (kg m^2)."""
-        return self.inertia + self.carried
+        return self.inertia + self.wheel_inertia
 
     def moment(self, forces: np.ndarray) -> np.ndarray:
         """Pitch moment (n,) in N m from wheel forces (n, 2) in N."""
-        return self.front * forces[:, 0] - self.rear * forces[:, 1]
+        return self.front_arm * forces[:, 0] - self.rear_arm * forces[:, 1]
 
-    def intensity(self, deviation: float, period: float) -> float:
+    def noise_intensity(self, deviation: float, period: float) -> float:
         """Intensity q (rad^2/s^3) of the pitch acceleration that white samples of both forces make.
 
         q = s^2 D (front^2 + rear^2) / (I + J)^2 with the standard deviation s (N) of each sample and the period D (s).
         """
-        return deviation**2 * period * (self.front**2 + self.rear**2) / self.total**2
+        return deviation**2 * period * (self.front_arm**2 + self.rear_arm**2) / self.total_inertia**2
 
-    def growth(self, rates: np.ndarray) -> np.ndarray:
+    def squared_growth_rate(self, rates: np.ndarray) -> np.ndarray:
         """Squared growth rate lambda^2 (1/s^2) for each of the fast pitch rates (rad/s); the forces are vertical in
         space."""
-        return rates**2 * self.inertia / self.total
+        return rates**2 * self.inertia / self.total_inertia
 
 
 def rigid_pitch(p: Parameters) -> RigidPitch:
@@ -79,7 +80,7 @@ def rigid_pitch(p: Parameters) -> RigidPitch:
     return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
 
 
-def high_passed(values: np.ndarray, period: float, cutoff: float = CUTOFF) -> np.ndarray:
+def high_passed(values: np.ndarray, period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
     """Part of the signal ``values`` (n,) above ``cutoff`` (Hz), without delay, with the gain x^4 / (1 + x^4) at x = f /
     cutoff.
 
@@ -98,16 +99,18 @@ def pitch_rate_of_forces(forces: np.ndarray, period: float, p: Parameters) -> np
     rigid = rigid_pitch(p)
     moment = rigid.moment(forces)
     steps = 0.5 * (moment[1:] + moment[:-1]) * period
-    return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total
+    return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total_inertia
 
 
-def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> float:
+def growth_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY) -> float:
     """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
     space."""
-    return float(np.sqrt(rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff)).mean()))
+    return float(np.sqrt(rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, period, cutoff)).mean()))
 
 
-def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = CUTOFF) -> np.ndarray:
+def sinh_law_rate(
+    pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+) -> np.ndarray:
     """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
     A noise impulse at s moves the pitch at t by g(t, s) with g'' = lambda^2(t) g. To first order in lambda^2 the
@@ -115,7 +118,7 @@ def sinh_law_rate(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: 
     happens at about two thirds of the time counts most.
     """
     times = period * np.arange(len(pitch_rate))
-    squares = rigid_pitch(p).growth(high_passed(pitch_rate, period, cutoff))
+    squares = rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, period, cutoff))
 
     def weighted(values: np.ndarray) -> np.ndarray:
         second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
@@ -137,12 +140,12 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
         if not (np.asarray(given, dtype=float) >= 0.0).all():
             raise InputError("", name, None, "must be 0 or more, and a number")
     t, x = np.asarray(times, dtype=float), 2.0 * np.asarray(rate, dtype=float) * np.asarray(times, dtype=float)
-    small = np.minimum(np.abs(x), SERIES) ** 2
+    small = np.minimum(np.abs(x), SERIES_LIMIT) ** 2
     series = 1.0 + small / 20 * (1.0 + small / 42 * (1.0 + small / 72 * (1.0 + small / 110)))
-    large = np.where(np.abs(x) > SERIES, x, 1.0)
+    large = np.where(np.abs(x) > SERIES_LIMIT, x, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # beyond all numbers is infinite, at no rate and no time alike
         closed = np.where(large > LARGEST_EXPONENT, np.inf, 6 * (np.sinh(large) - large) / large**3)
-    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES, closed, series)
+    return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_LIMIT, closed, series)
 
 
 def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, period: float) -> np.ndarray:
@@ -153,13 +156,13 @@ def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, p
 
 def holding_stiffness(p: Parameters, rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that holds the pitch: (I + J) lambda^2."""
-    return rigid_pitch(p).total * rate**2
+    return rigid_pitch(p).total_inertia * rate**2
 
 
 def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
     d = 2 zeta (I + J) wc in N m s/rad."""
-    corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total
+    corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total_inertia
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 
@@ -177,7 +180,7 @@ def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     ):
         if not (math.isfinite(value) and value >= least):
             raise InputError("", name, value, "must be finite, intensity and angle above 0 and the rate not below")
-    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN) - math.log(intensity)) / 3.0  # without growth
+    longest = (math.log(3.0) + 2.0 * math.log(angle / MEDIAN_OF_NORMAL) - math.log(intensity)) / 3.0  # without growth
     if rate == 0.0:
         return math.exp(longest)
     most = math.log(2.0) + math.log(rate) + longest

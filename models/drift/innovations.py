@@ -13,18 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-LEVEL = 1e-3
+FALSE_ALARM_SHARE = 1e-3
 """Share of the runs of a right filter that are called inconsistent all the same."""
-LAGS = 20
+CORRELATION_LAGS = 20
 """Samples over which correlation is looked for."""
 FEWEST_INNOVATIONS = 100
 """Innovations of a column below which its mean and correlation are not judged."""
 
 
 @dataclass(frozen=True)
-class Figure:
+class AcceptedStatistic:
     """A statistic of a run with its acceptance interval. If the filter is right, the statistic lies outside it only
-    with probability LEVEL."""
+    with probability FALSE_ALARM_SHARE."""
 
     name: str
     value: float
@@ -32,7 +32,7 @@ class Figure:
     high: float
 
     @property
-    def inside(self) -> bool:
+    def is_within_interval(self) -> bool:
         """Whether the statistic lies within its acceptance interval."""
         return self.low <= self.value <= self.high
 
@@ -45,21 +45,21 @@ class Figure:
 class Consistency:
     """Statistics of a run's innovations, the first one being the mean square of all normalised innovations."""
 
-    figures: tuple[Figure, ...]
+    statistics: tuple[AcceptedStatistic, ...]
 
     @property
     def consistent(self) -> bool:
         """Whether all statistics lie within their acceptance intervals."""
-        return all(figure.inside for figure in self.figures)
+        return all(figure.is_within_interval for figure in self.statistics)
 
     def __str__(self) -> str:
         """One sentence: which statistics are outside their intervals, or that none is."""
         if self.consistent:
-            return f"its innovations are as stated: {self.figures[0]}"
-        wrong = "; ".join(map(str, (figure for figure in self.figures if not figure.inside)))
+            return f"its innovations are as stated: {self.statistics[0]}"
+        wrong = "; ".join(map(str, (figure for figure in self.statistics if not figure.is_within_interval)))
         return (
             f"its innovations are not what model and stated deviations make: {wrong}; in brackets where those "
-            f"of a right filter lie, but for one run in {1 / LEVEL:.0f}"
+            f"of a right filter lie, but for one run in {1 / FALSE_ALARM_SHARE:.0f}"
         )
 
 
@@ -67,36 +67,36 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
     """Consistency figures of normalised innovations (n, columns), independent and of deviation 1 where the filter is
     right; NaN where nothing was measured."""
     known = np.isfinite(innovations)
-    tail = LEVEL / (1 + 2 * len(names)) / 2
+    tail = FALSE_ALARM_SHARE / (1 + 2 * len(names)) / 2
     count = int(known.sum())
     if not count:
         return Consistency(())
     square = float(np.mean(innovations[known] ** 2))
-    figures = [Figure("mean square", square, *(chi2.ppf([tail, 1 - tail], count) / count).tolist())]
+    figures = [AcceptedStatistic("mean square", square, *(chi2.ppf([tail, 1 - tail], count) / count).tolist())]
     for name, column in zip(names, innovations.T, strict=True):
         if np.isfinite(column).sum() >= FEWEST_INNOVATIONS:
-            figures += [_mean(name, column, tail), _correlation(name, column, tail)]
+            figures += [_mean_innovation(name, column, tail), _correlation(name, column, tail)]
     return Consistency(tuple(figures))
 
 
-def _mean(name: str, column: np.ndarray, tail: float) -> Figure:
+def _mean_innovation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
     """Statistic of the mean innovation, in units of its standard deviation."""
     known = column[np.isfinite(column)]
     wide = float(norm.isf(tail)) / math.sqrt(len(known))
-    return Figure(f"mean of {name}", float(known.mean()), -wide, wide)
+    return AcceptedStatistic(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
-def _correlation(name: str, column: np.ndarray, tail: float) -> Figure:
-    """Statistic of serial correlation: root mean square of the correlations at lags 1 to LAGS.
+def _correlation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
+    """Statistic of serial correlation: root mean square of the correlations at lags 1 to CORRELATION_LAGS.
 
     For white samples each correlation is normal, with a variance of one over the number of pairs (Box and Pierce).
     """
     whole = np.where(np.isfinite(column), column, 0.0)
     there = np.isfinite(column).astype(float)
-    lags = range(1, min(LAGS, len(column) // 5) + 1)
+    lags = range(1, min(CORRELATION_LAGS, len(column) // 5) + 1)
     pairs = np.array([float(there[lag:] @ there[:-lag]) for lag in lags])
     power = float(whole @ whole) / there.sum()
     each = np.array([float(whole[lag:] @ whole[:-lag]) for lag in lags]) / np.maximum(pairs, 1.0) / power
     size = math.sqrt(float(np.sum(pairs * each**2)) / float(pairs.sum()))
     high = math.sqrt(float(chi2.isf(tail, len(lags))) / float(pairs.sum()))
-    return Figure(f"correlation of {name}", size, 0.0, high)
+    return AcceptedStatistic(f"correlation of {name}", size, 0.0, high)

@@ -15,54 +15,56 @@ import numpy as np
 from scipy.signal import lfilter
 
 from models.core.errors import InputError
-from models.core.noise import normal
+from models.core.noise import normal_samples
 
 SERIES_LIMIT = 1.0
 """Damping times time below which a series is used: 20 terms there, and no digit lost by the closed form above."""
 
 
-def continuous(time: float, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
+def continuous_covariance(
+    time: float, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0
+) -> np.ndarray:
     """Covariance after ``time`` (s) of eq. (4); ``damping`` eta in 1/s, zero or more.
 
-    Raises InputError where the closed form does not hold (see ``_check``).
+    Raises InputError where the closed form does not hold (see ``_check_inputs``).
     """
-    _check(deviation, step, mass, damping, time)
+    _check_inputs(deviation, step, mass, damping, time)
     intensity, decayed = deviation**2 * step / mass**2, damping * time
-    position = intensity * time**3 * _bracket(decayed)
-    mixed = intensity * time**2 / 2 * _relative(decayed) ** 2
-    velocity = intensity * time * _relative(2 * decayed)
+    position = intensity * time**3 * _bracket_ratio(decayed)
+    mixed = intensity * time**2 / 2 * _relative_decay(decayed) ** 2
+    velocity = intensity * time * _relative_decay(2 * decayed)
     return np.array([[position, mixed], [mixed, velocity]])
 
 
-def _relative(x: float) -> float:
+def _relative_decay(x: float) -> float:
     """(1 - exp(-x)) / x."""
     return -math.expm1(-x) / x if x else 1.0
 
 
-def _bracket(x: float) -> float:
+def _bracket_ratio(x: float) -> float:
     """Ratio of the bracket of eq. (11) to t^3 eta^2: (x + (1 - exp(-2x))/2 - 2 (1 - exp(-x))) / x^3, 1/3 at x = 0."""
     if x > SERIES_LIMIT:
         return (x - math.expm1(-2 * x) / 2 + 2 * math.expm1(-x)) / x**3
     return math.fsum((2 ** (k - 1) - 2) / math.factorial(k) * (-1) ** (k + 1) * x ** (k - 3) for k in range(3, 26))
 
 
-def discrete(steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
+def euler_covariance(steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0) -> np.ndarray:
     """Covariance after ``steps`` steps of the explicit Euler scheme (3), exactly.
 
     With h = eta step, r = 1 - h and the sums S1, S2 of r^i and r^(2i): Var v = q S2, Cov = q step (S1 - S2) / h,
     Var x = q step^2 (n - 2 S1 + S2) / h^2, where q = (deviation step / mass)^2. Raises InputError where the
     scheme is unstable, h >= 2.
     """
-    _check(deviation, step, mass, damping, steps)
-    h = _stable(damping * step)
+    _check_inputs(deviation, step, mass, damping, steps)
+    h = _damping_times_step(damping * step)
     kick = (deviation * step / mass) ** 2
     last, before = _geometric_sum(h, steps), _geometric_sum(h, steps - 1)
     mixed = (1 - h) * last * before / (2 - h) if h else steps * (steps - 1) / 2
     velocity = _geometric_sum(h * (2 - h), steps)
-    return kick * np.array([[step**2 * _squares(h, steps), step * mixed], [step * mixed, velocity]])
+    return kick * np.array([[step**2 * _sum_of_squares(h, steps), step * mixed], [step * mixed, velocity]])
 
 
-def _stable(h: float) -> float:
+def _damping_times_step(h: float) -> float:
     """Product of damping and step, after a check that it is below 2."""
     if h >= 2:
         raise InputError("", "damping", None, f"times step is {h:g}: the explicit Euler scheme is unstable from 2 on")
@@ -76,7 +78,7 @@ def _geometric_sum(h: float, n: int) -> float:
     return -math.expm1(n * math.log1p(-h)) / h if h < 0.5 else (1 - (1 - h) ** n) / h
 
 
-def _squares(h: float, n: int) -> float:
+def _sum_of_squares(h: float, n: int) -> float:
     """Sum over i < n of ((1 - (1 - h)^i) / h)^2, that is (n - 2 S1 + S2) / h^2.
 
     For small h the binomial expansion of (2 - h) (n - 2 S1 + S2): its terms up to h^1 vanish, and the exact
@@ -91,7 +93,7 @@ def _squares(h: float, n: int) -> float:
     return n**3 / (2 - h) * math.fsum(c / d * (-n * h) ** (k - 2) for k, (c, d) in zip(terms, whole, strict=True))
 
 
-def _check(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
+def _check_inputs(deviation: float, step: float, mass: float, damping: float, length: float) -> None:
     """Require deviation, damping and length to be zero or more, step and mass above zero, and all finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
@@ -101,15 +103,15 @@ def _check(deviation: float, step: float, mass: float, damping: float, length: f
         raise InputError("", "point mass", None, f"none has {numbers}")
 
 
-def paths(
+def monte_carlo_errors(
     count: int, steps: int, deviation: float, step: float, mass: float = 1.0, damping: float = 0.0, seed: int = 0
 ) -> np.ndarray:
     """Monte Carlo: errors (count, 2) of position (m) and velocity (m/s) of Euler paths after ``steps`` steps.
 
-    Raises InputError as ``discrete`` does.
+    Raises InputError as ``euler_covariance`` does.
     """
-    _check(deviation, step, mass, damping, steps)
-    _stable(damping * step)
-    kicks = deviation * step / mass * normal(seed, 0, count * steps, 1).reshape(count, steps)
+    _check_inputs(deviation, step, mass, damping, steps)
+    _damping_times_step(damping * step)
+    kicks = deviation * step / mass * normal_samples(seed, 0, count * steps, 1).reshape(count, steps)
     velocity = lfilter([1.0], [1.0, damping * step - 1.0], kicks, axis=1)
     return np.column_stack([step * velocity[:, :-1].sum(axis=1), velocity[:, -1]])

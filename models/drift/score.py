@@ -17,25 +17,25 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict
-from models.fatigue.damage import SLOPE, damage_ratio
+from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
 from models.vehicles.pitch_plane import Parameters
 
-BAND = 15.0
+JUDGED_BAND = 15.0
 """Upper edge (Hz) of the band in which the artificial moment is judged: what bends a chassis."""
-ORDER = 4
+BUTTERWORTH_ORDER = 4
 """Order of the Butterworth low-pass, run forwards and backwards (``scipy.signal.sosfiltfilt``): no phase, -6 dB at
-BAND."""
-TUMBLED = 0.5
+JUDGED_BAND."""
+TUMBLING_PITCH = 0.5
 """Pitch (rad) beyond which no road is that steep."""
-MEASURED = ("prescribed_pitch", "prescribed_heave_and_pitch", "kalman_filter")
+MEASURED_PITCH_EFFECTS = ("prescribed_pitch", "prescribed_heave_and_pitch", "kalman_filter")
 """Effects that hold the pitch to a measured one."""
-LEVEL = ("pitch_spring", "high_pass")
+LEVELLING_EFFECTS = ("pitch_spring", "high_pass")
 """Effects that hold it near zero, whatever the road does."""
 
-CONFIDENCE = 0.999
+INNOVATION_CONFIDENCE = 0.999
 """Of the band in which a filter's innovations must lie."""
 
-SURPRISED = 2.0
+DOUBTFUL_INNOVATION_LIMIT = 2.0
 """Mean of the normalised innovation squared from which on the measurements of a filter of roll and pitch are doubted: 1
 is right, and noise that is estimated is right to a third. An axle force 0.5 % too large, which takes a third off the
 damage along the vehicle, makes 2."""
@@ -66,7 +66,7 @@ class RunFigures:
     Attributes
     ----------
     moment_rms, moment_max : artificial moment in N m, all frequencies
-    moment_share, moment_share_band : its rms divided by that of I pitch'', over all frequencies and up to BAND
+    moment_share, moment_share_band : its rms divided by that of I pitch'', over all frequencies and up to JUDGED_BAND
     force_share_band : the same for the vertical force on the chassis, by m3 z3''
     pitch_max : largest |pitch| in rad
     seconds, force_calls, steps : what it cost
@@ -128,7 +128,7 @@ def figures_of_run(run: Result, p: Parameters) -> RunFigures:
     }
     counts = run.counts()
     return RunFigures(
-        moment_rms=rms(moment),
+        moment_rms=root_mean_square(moment),
         moment_max=float(np.abs(moment).max()),
         moment_share=_rms_ratio(moment, inertia),
         moment_share_band=_rms_ratio(band["moment"], band["inertia"]),
@@ -140,7 +140,7 @@ def figures_of_run(run: Result, p: Parameters) -> RunFigures:
     )
 
 
-def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
+def errors_of_run(run: Result, truth: Result, slope: float = WOEHLER_SLOPE) -> Errors:
     """Errors of a run compared with the true run; both have rows at the same times; ``slope`` is the Woehler exponent.
 
     Raises InputError if the rows lie at different times, or if a load of the truth never turns.
@@ -150,42 +150,42 @@ def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
     loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, truth))
     pitch = run["pitch"] - truth["pitch"]
     return Errors(
-        damage={name: damage_ratio(loads[name], true[name], slope) for name in CHANNELS},
-        force_rms={name: rms(loads[name] - true[name]) for name in CHANNELS},
+        damage={name: damage_ratio(loads[name], true[name], slope) for name in SECTION_FORCE_CHANNELS},
+        force_rms={name: root_mean_square(loads[name] - true[name]) for name in SECTION_FORCE_CHANNELS},
         vertical_damage={name: damage_ratio(run[name], truth[name], slope) for name in ("f3", "f4")},
         pitch_max=float(np.abs(pitch).max()),
-        pitch_rms=rms(pitch),
+        pitch_rms=root_mean_square(pitch),
         heave_max=float(np.abs(run["z3"] - truth["z3"]).max()),
     )
 
 
-def verdict(figures: RunFigures, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict_on_run(figures: RunFigures, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
     """The verdict of a virtual measurement, by damage, pitch error and artificial moment.
 
-    ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED or LEVEL among
-    the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
+    ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED_PITCH_EFFECTS or
+    LEVELLING_EFFECTS among the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
     """
-    if figures.pitch_max > TUMBLED:
-        return _tumbled(figures)
-    wrong = [*_exceeded_limits(deviations, limits), *_burden(figures, limits)]
+    if figures.pitch_max > TUMBLING_PITCH:
+        return _tumbling_verdict(figures)
+    wrong = [*_exceeded_limits(deviations, limits), *_burden_sentences(figures, limits)]
     if not wrong:
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
-    stabilised = not set(effects).isdisjoint((*MEASURED, *LEVEL))
+    stabilised = not set(effects).isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS))
     return Verdict("rejected" if stabilised else "stabilise", "; ".join(wrong))
 
 
-def consistent(run: Result) -> bool | None:
+def innovations_are_consistent(run: Result) -> bool | None:
     """Whether the innovations of a run's Kalman filter are as large as the filter expects; None without a filter.
 
     The mean normalised innovation squared over the whole run, per measured value, lies in the chi-square band of
-    CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.
+    INNOVATION_CONFIDENCE. A filter whose model is wrong in a way that it does not allow for lies far above it.
     """
     from scipy.stats import chi2
 
     if "kalman_surprise" not in run.data:
         return None
     count = float(run["kalman_used"][-1])
-    low, high = chi2.ppf([0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], count)
+    low, high = chi2.ppf([0.5 - INNOVATION_CONFIDENCE / 2, 0.5 + INNOVATION_CONFIDENCE / 2], count)
     return bool(low <= run["kalman_surprise"][-1] <= high)
 
 
@@ -206,33 +206,34 @@ def blind_verdict(
 ) -> Verdict:
     """Verdict of an engineer who has no true run, from figures of the run itself; damage is not among them.
 
-    ``accepted``: the pitch is held to a measured one (MEASURED), the artificial moment is within its limit and the
-    filter, where there is one, is ``consistent`` with its measurement (NIS within its band) and its own ``uncertainty``
-    (rad) is within the limit of pitch errors; or a free run ends before
+    ``accepted``: the pitch is held to a measured one (MEASURED_PITCH_EFFECTS), the artificial moment is within its
+    limit and the filter, where there is one, is ``innovations_are_consistent`` with its measurement (NIS within its
+    band) and its own ``uncertainty`` (rad) is within the limit of pitch errors; or a free run ends before
     the ``trusted`` time (s) predicted for it. ``stabilise``: a longer free run, or one that is held near zero
-    (LEVEL): that is wrong on a grade, and nothing in the run shows it. ``rejected``: all else.
+    (LEVELLING_EFFECTS): that is wrong on a grade, and nothing in the run shows it. ``rejected``: all else.
 
-    effects : names of the scene's effects; duration : of the run in s; ``trusted`` and ``consistent`` None: not known.
+    effects : names of the scene's effects; duration : of the run in s; ``trusted`` and ``innovations_are_consistent``
+    None: not known.
     """
     named = set(effects)
-    if figures.pitch_max > TUMBLED:
-        return _tumbled(figures)
-    if named.isdisjoint((*MEASURED, *LEVEL)):
-        return _free(duration, trusted)
-    wrong = _burden(figures, limits) + (["NIS outside its band"] if consistent is False else [])
+    if figures.pitch_max > TUMBLING_PITCH:
+        return _tumbling_verdict(figures)
+    if named.isdisjoint((*MEASURED_PITCH_EFFECTS, *LEVELLING_EFFECTS)):
+        return _free_run_verdict(duration, trusted)
+    wrong = _burden_sentences(figures, limits) + (["NIS outside its band"] if consistent is False else [])
     wrong += [f"pitch known to {uncertainty:.2g} rad only"] if uncertainty > limits.pitch_error else []
     if wrong:
         return Verdict("rejected", "; ".join(wrong))
-    if named.isdisjoint(MEASURED):
+    if named.isdisjoint(MEASURED_PITCH_EFFECTS):
         return Verdict("stabilise", "held near zero, not to a measured pitch: wrong on a grade, unseen in the run")
     return Verdict("accepted", f"held to the measured pitch by {figures.moment_share_band:.1%} of I pitch''")
 
 
-def _tumbled(figures: RunFigures) -> Verdict:
+def _tumbling_verdict(figures: RunFigures) -> Verdict:
     return Verdict("rejected", f"tumbled: pitch of {figures.pitch_max:.2g} rad; none of its forces mean anything")
 
 
-def _free(duration: float, trusted: float | None) -> Verdict:
+def _free_run_verdict(duration: float, trusted: float | None) -> Verdict:
     if trusted is None:
         return Verdict("stabilise", "free, and nothing predicts how long it can be trusted")
     if duration <= trusted:
@@ -252,7 +253,7 @@ def _exceeded_limits(deviations: Errors, limits: Limits) -> list[str]:
     )
 
 
-def _burden(figures: RunFigures, limits: Limits) -> list[str]:
+def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
     """Sentences on the stabiliser's share of moment and force where it exceeds the limit."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
@@ -262,21 +263,21 @@ def _burden(figures: RunFigures, limits: Limits) -> list[str]:
     ]
 
 
-def rms(values: np.ndarray) -> float:
+def root_mean_square(values: np.ndarray) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def low_pass(values: np.ndarray, step: float) -> np.ndarray:
-    """Samples (n,) spaced ``step`` (s), with frequencies above BAND removed without phase shift."""
+    """Samples (n,) spaced ``step`` (s), with frequencies above JUDGED_BAND removed without phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
-    return sosfiltfilt(butter(ORDER, BAND, fs=1.0 / step, output="sos"), values)
+    return sosfiltfilt(butter(BUTTERWORTH_ORDER, JUDGED_BAND, fs=1.0 / step, output="sos"), values)
 
 
 def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
     """Ratio of the rms of a part to that of the total; 0 where both are 0."""
-    size, all_of_it = rms(values), rms(total)
+    size, all_of_it = root_mean_square(values), root_mean_square(total)
     return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 
@@ -309,7 +310,7 @@ def _step(run: Result) -> float:
     return float(steps.mean())
 
 
-CHANNELS = ("f3x", "f3z", "f4x", "f4z")
+SECTION_FORCE_CHANNELS = ("f3x", "f3z", "f4x", "f4z")
 """Front and rear, along the chassis' forward axis and (in compression) along its vertical one."""
 
 

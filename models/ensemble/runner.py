@@ -24,14 +24,14 @@ from models.core.errors import InputError, RunFailed
 from models.core.whole_files import DISK_FULL_ERRORS, reason_of
 from models.ensemble.store import Arrays, Store
 
-BLOCK = 50
+PATHS_PER_BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""
 BLOCKS_AHEAD = 64
 """Blocks under way at once, so that the memory for results on their way stays bounded; two per worker of a cluster that
 has more."""
 NAMED_FAILURES = 5
 """Failed blocks that a message names."""
-LIVES, AMONG_OTHERS = 4, 2
+MOST_WORKER_LOSSES, AMONG_OTHERS = 4, 2
 """Times that a block may lose its worker, of which so many among others; then it is computed alone, and is to blame
 where that fails twice: once may be anybody's kill."""
 
@@ -44,7 +44,7 @@ class Blocks(NamedTuple):
     """Division of an ensemble's paths into blocks: ``size`` paths per block, at most ``ahead`` blocks computed at
     once."""
 
-    size: int = BLOCK
+    size: int = PATHS_PER_BLOCK
     ahead: int = BLOCKS_AHEAD
 
     def count(self, paths: int) -> int:
@@ -56,7 +56,7 @@ class Blocks(NamedTuple):
         return range(number * self.size, min((number + 1) * self.size, paths))
 
 
-BLOCKS = Blocks()
+DEFAULT_BLOCKS = Blocks()
 """As paths are cut where nothing else is asked for."""
 
 
@@ -103,7 +103,7 @@ class _Failure:
 
     reason: str
     full: bool = False
-    gone: bool = False
+    worker_is_gone: bool = False
     error: InputError | RunFailed | None = None
 
 
@@ -124,13 +124,13 @@ class _Memory:
 
 
 @dataclass
-class _Counted:
+class _PathCounter:
     """Counts finished paths, and reports the time left for the others."""
 
     paths: int
     done: int
     tell: Callable[[EnsembleProgress], None]
-    begun: float = field(default_factory=time.perf_counter)
+    start_time: float = field(default_factory=time.perf_counter)
     before: int = 0
 
     def __post_init__(self) -> None:
@@ -139,7 +139,7 @@ class _Counted:
 
     def add(self, paths: int) -> None:
         self.done += paths
-        rate = (self.done - self.before) / (time.perf_counter() - self.begun)
+        rate = (self.done - self.before) / (time.perf_counter() - self.start_time)
         self.tell(EnsembleProgress(self.done, self.paths, rate, (self.paths - self.done) / rate))
 
 
@@ -148,7 +148,7 @@ def run_paths(
     paths: int,
     folder: Path | None = None,
     executor: Executor | None = None,
-    blocks: Blocks = BLOCKS,
+    blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Arrays:
@@ -166,7 +166,7 @@ def each_block(
     paths: int,
     folder: Path | None = None,
     executor: Executor | None = None,
-    blocks: Blocks = BLOCKS,
+    blocks: Blocks = DEFAULT_BLOCKS,
     progress: Callable[[EnsembleProgress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
 ) -> Generator[Arrays]:
@@ -183,11 +183,11 @@ def each_block(
     facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
     count, block = blocks.count(paths), partial(blocks.block, paths=paths)
     store = _Memory() if folder is None else Store(folder)
-    with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
+    with nullcontext() if isinstance(store, _Memory) else store.reserved_folder(facts):
         failed = dict[int, str]()
-        counted = _Counted(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
+        counted = _PathCounter(paths, sum(len(block(i)) for i in range(count) if store.has(i)), progress)
         missing = ((i, block(i)) for i in range(count) if not store.has(i))
-        answers = _answers(job, missing, executor, blocks.ahead)
+        answers = _answers_of_blocks(job, missing, executor, blocks.ahead)
         with closing(answers):  # an interrupt drops at once what waits
             given = 0
             while given < count:
@@ -200,7 +200,7 @@ def each_block(
                 elif not _next_kept(answers, store, failed, counted):
                     break
         if failed and lost is None:
-            raise _failure({i: (block(i), reason) for i, reason in failed.items()}, folder)
+            raise _failed_blocks_error({i: (block(i), reason) for i, reason in failed.items()}, folder)
 
 
 def in_order(
@@ -231,10 +231,10 @@ def in_order(
             if not kept.has(i):
                 yield i, block
 
-    with closing(_answers(function, missing(), executor, ahead)) as answers:
+    with closing(_answers_of_blocks(function, missing(), executor, ahead)) as answers:
         for i, _, answer in answers:
             if isinstance(answer, _Failure):
-                raise (_disk_full if answer.full else _gone)(f"block {i}: {answer.reason}", kept)
+                raise (_disk_full if answer.full else _lost_workers_error)(f"block {i}: {answer.reason}", kept)
             _save_block(kept, i, answer)
             while given in here and kept.has(given):
                 yield here.pop(given), kept.load(given)
@@ -251,7 +251,7 @@ def block_results(function: Callable[[T], Any], blocks: Iterable[T], executor: E
     """
     if executor is None:
         return [function(block) for block in blocks]
-    with closing(_answers(function, iter(enumerate(blocks)), executor, BLOCKS_AHEAD)) as answers:
+    with closing(_answers_of_blocks(function, iter(enumerate(blocks)), executor, BLOCKS_AHEAD)) as answers:
         kept = {i: answer for i, _, answer in answers}
     ordered = [kept[i] for i in sorted(kept)]
     for answer in ordered:
@@ -264,7 +264,7 @@ def _next_kept(
     answers: Iterator[tuple[int, range, Arrays | _Failure]],
     store: Store | _Memory,
     failed: dict[int, str],
-    counted: _Counted,
+    counted: _PathCounter,
 ) -> bool:
     """Store the next answer, or record why it failed; returns False when there are no more answers."""
     i, block, answer = next(answers, (-1, range(0), _Failure("")))
@@ -273,8 +273,8 @@ def _next_kept(
     if isinstance(answer, _Failure):
         if answer.full:
             raise _disk_full(answer.reason, store)
-        if answer.gone:
-            raise _gone(answer.reason, store)
+        if answer.worker_is_gone:
+            raise _lost_workers_error(answer.reason, store)
         failed[i] = answer.reason
         return True
     _save_block(store, i, answer)
@@ -282,7 +282,7 @@ def _next_kept(
     return True
 
 
-def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
+def _failed_blocks_error(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFailed:
     """The error that lists the failed blocks and paths."""
     told = [f"block {i} (paths {block[0]} to {block[-1]}): {reason}" for i, (block, reason) in failed.items()]
     kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
@@ -290,13 +290,13 @@ def _failure(failed: dict[int, tuple[range, str]], folder: Path | None) -> RunFa
     return RunFailed("ensemble", "; ".join(told[:NAMED_FAILURES]) + more + kept)
 
 
-def _answers(
+def _answers_of_blocks(
     job: Callable[[T], Arrays], missing: Iterator[tuple[int, T]], executor: Executor | None, ahead: int
 ) -> Generator[tuple[int, T, Arrays | _Failure]]:
     """Blocks and their answers in order of completion. At most ``ahead`` blocks are computed at once, and none is begun
     more than that many after the first unfinished one."""
     if executor is None:
-        yield from ((i, block, _attempt(job, block)) for i, block in missing)
+        yield from ((i, block, _compute_block(job, block)) for i, block in missing)
         return
     ahead = ahead if ahead == 1 else max(ahead, 2 * getattr(executor, "width", 0))
     queue, alone = deque(islice(missing, ahead)), deque[tuple[int, T]]()
@@ -305,14 +305,14 @@ def _answers(
         while queue or alone or waiting:
             while (queue and _may_begin(queue[0][0], waiting, alone, ahead)) or (alone and not waiting):
                 i, block = (queue or alone).popleft()
-                waiting[_submitted(executor, job, block)] = i, block
+                waiting[_submitted_block(executor, job, block)] = i, block
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 i, block = waiting.pop(future)
                 error = _error(future)
                 died = _worker_died(error)
                 if died:
                     lost[i] += 1
-                if died and lost[i] < LIVES:
+                if died and lost[i] < MOST_WORKER_LOSSES:
                     (alone if lost[i] >= AMONG_OTHERS else queue).appendleft((i, block))
                 else:
                     yield i, block, future.result() if error is None else _error_text(error)
@@ -357,22 +357,22 @@ def _disk_full(reason: str, store: Store | _Memory) -> RunFailed:
     return RunFailed("ensemble", f"{reason}{kept}")
 
 
-def _gone(reason: str, store: Store | _Memory) -> RunFailed:
+def _lost_workers_error(reason: str, store: Store | _Memory) -> RunFailed:
     kept = f"; the finished blocks are kept in {store.folder}: resume there" if isinstance(store, Store) else ""
     return RunFailed("ensemble", f"{reason}{kept}")
 
 
-def _submitted(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
+def _submitted_block(executor: Executor, job: Callable[[T], Arrays], block: T) -> Future:
     """Future of a block; a failed future if the pool has lost its workers."""
     try:
-        return executor.submit(_attempt, job, block)
+        return executor.submit(_compute_block, job, block)
     except BrokenExecutor as error:
         lost: Future = Future()
         lost.set_exception(error)
         return lost
 
 
-def _attempt(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
+def _compute_block(job: Callable[[T], Arrays], block: T) -> Arrays | _Failure:
     """Compute one block in the worker; a failure is returned instead of raised."""
     try:
         arrays = job(block)
@@ -388,7 +388,7 @@ def _error_text(error: BaseException) -> _Failure:
     if _worker_died(error):
         return _Failure("its worker died: killed, or out of memory")
     if isinstance(error, CancelledError) or type(error).__name__ == "FutureCancelledError":
-        return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", gone=True)
+        return _Failure("the cluster is gone: its scheduler ended, or cannot be reached any more", worker_is_gone=True)
     full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRORS
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
     return _Failure(said, full, error=error if isinstance(error, InputError | RunFailed) else None)

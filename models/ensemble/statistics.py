@@ -9,11 +9,11 @@ from models.core.errors import InputError
 FEWEST_PATHS = 3
 ERRORS_95 = 1.959964
 """Standard errors on either side of a 95 % interval."""
-FAN = (5, 25, 50, 75, 95)
+FAN_PERCENTILES = (5, 25, 50, 75, 95)
 """Percentiles of a figure."""
 
 
-def deviation(values: np.ndarray) -> tuple[float, float]:
+def deviation_with_error(values: np.ndarray) -> tuple[float, float]:
     """Standard deviation of values (n,) and its standard error, for any law of finite fourth moment.
 
     By Var(s^2) = (mu4 - sigma^4) / n to first order; 1/sqrt(2 n) of it for a normal law. Not a number if any
@@ -36,11 +36,13 @@ def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float
 
 
 def percentiles(errors: np.ndarray) -> np.ndarray:
-    """Percentiles FAN of the magnitude of errors (paths, times), shape (5, times); failed paths are left out."""
-    return np.nanpercentile(np.abs(errors), FAN, axis=0)
+    """Percentiles FAN_PERCENTILES of the magnitude of errors (paths, times), shape (5, times); failed paths are left
+    out.
+    """
+    return np.nanpercentile(np.abs(errors), FAN_PERCENTILES, axis=0)
 
 
-def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
+def quantile_with_interval(values: np.ndarray, level: float) -> tuple[float, float, float]:
     """Quantile of values (n,), some of which may be infinite, and the ends of its 95 % interval.
 
     Order statistics, so no law is assumed; the ranks of the interval by the normal limit of the binomial. Raises
@@ -49,11 +51,11 @@ def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
     if not len(values) or np.isnan(values).any():
         raise InputError("", "values", None, "must be numbers, one or more; infinite ones are allowed")
     ordered = np.sort(values)
-    middle, low, high = (float(ordered[rank]) for rank in ranks(len(values), level))
+    middle, low, high = (float(ordered[rank]) for rank in quantile_ranks(len(values), level))
     return middle, low, high
 
 
-def ranks(count: int, level: float) -> tuple[int, int, int]:
+def quantile_ranks(count: int, level: float) -> tuple[int, int, int]:
     """Ranks, from 0, of a quantile of ``count`` values and of the ends of its 95 % interval; InputError for a level
     that is not between 0 and 1."""
     if not 0.0 < level < 1.0:

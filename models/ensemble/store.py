@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.result import PACKAGES
+from models.core.result import RECORDED_PACKAGES
 from models.core.whole_files import drop_parts, write_whole
 
 Arrays = dict[str, np.ndarray]
-JOB = "job.json"
+JOB_FILE = "job.json"
 """What the blocks of a folder belong to."""
-LOCK = ".lock"
+LOCK_FILE = ".lock"
 """File that the process at work in a folder holds."""
 
 
@@ -35,20 +35,20 @@ class Store:
     folder: Path
 
     @contextmanager
-    def claimed(self, facts: dict[str, Any]) -> Iterator[None]:
+    def reserved_folder(self, facts: dict[str, Any]) -> Iterator[None]:
         """Context in which the folder is reserved for this job and process.
 
         Raises InputError if it belongs to another job, or if another process is at work in it.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        with locked(self.folder):
+        with exclusive_folder(self.folder):
             drop_parts(self.folder)
-            self._claim(fingerprint(facts))
+            self._write_job(fingerprint(facts))
             yield
 
-    def _claim(self, described: dict[str, Any]) -> None:
+    def _write_job(self, described: dict[str, Any]) -> None:
         """Write into the folder to which job its blocks belong; raises InputError if it belongs to another job."""
-        file = self.folder / JOB
+        file = self.folder / JOB_FILE
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())
             return
@@ -86,7 +86,7 @@ class Store:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def exclusive_folder(folder: Path) -> Iterator[None]:
     """Context with exclusive use of the folder; InputError if another process has it. The lock ends with its
     process."""
     try:
@@ -94,7 +94,7 @@ def locked(folder: Path) -> Iterator[None]:
     except ImportError:  # not a system that has such locks
         yield
         return
-    with (folder / LOCK).open("a") as file:
+    with (folder / LOCK_FILE).open("a") as file:
         try:
             flock(file, LOCK_EX | LOCK_NB)
         except BlockingIOError:
@@ -116,13 +116,15 @@ def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
 
     Bits depend on all of these (and on the processor's own rounding of sines, which is left out).
     """
-    versions = {name: version(name) for name in PACKAGES}
-    return dict(_flat("", {**facts, "code of models": _code(), "versions": versions}))
+    versions = {name: version(name) for name in RECORDED_PACKAGES}
+    return dict(_flat_items("", {**facts, "code of models": _code_checksum(), "versions": versions}))
 
 
-def _flat(place: str, value: Any) -> list[tuple[str, Any]]:
+def _flat_items(place: str, value: Any) -> list[tuple[str, Any]]:
     if isinstance(value, dict):
-        return [pair for key, inner in value.items() for pair in _flat(f"{place}.{key}" if place else str(key), inner)]
+        return [
+            pair for key, inner in value.items() for pair in _flat_items(f"{place}.{key}" if place else str(key), inner)
+        ]
     if isinstance(value, np.ndarray):
         digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
         return [(place, f"{value.dtype} {list(value.shape)} {digest}")]
@@ -130,11 +132,11 @@ def _flat(place: str, value: Any) -> list[tuple[str, Any]]:
 
 
 @cache
-def _code() -> str:
-    return code(Path(__file__).parents[1])
+def _code_checksum() -> str:
+    return checksum_of_sources(Path(__file__).parents[1])
 
 
-def code(root: Path) -> str:
+def checksum_of_sources(root: Path) -> str:
     """Checksum of all files below a folder on which a run can depend: sources, parameters, tables."""
     digest = hashlib.sha256()
     for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
@@ -149,20 +151,20 @@ def named_files(value: Any, folder: Path) -> dict[str, str]:
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
     """
     hashes: dict[str, str] = {}
-    _collect(value, folder, hashes, set())
+    _collect_files(value, folder, hashes, set())
     return hashes
 
 
-def _collect(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
+def _collect_files(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
     if isinstance(value, dict | list | tuple):
         for inner in value.values() if isinstance(value, dict) else value:
-            _collect(inner, folder, hashes, paths_seen)
+            _collect_files(inner, folder, hashes, paths_seen)
     elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in paths_seen:
         paths_seen.add(path.resolve())
         content = path.read_bytes()
         hashes[value] = hashes.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
-            _collect(_table(content), path.parent, hashes, paths_seen)
+            _collect_files(_table(content), path.parent, hashes, paths_seen)
 
 
 def _file(text: str, folder: Path) -> Path | None:

@@ -10,9 +10,9 @@ from collections import Counter
 
 import numpy as np
 
-from models.ensemble.statistics import deviation_of, ranks
+from models.ensemble.statistics import deviation_of, quantile_ranks
 
-ACCURACY = 0.005
+QUANTILE_ACCURACY = 0.005
 """Largest relative error of a quantile by ``Spread``."""
 SMALLEST_MAGNITUDE, LARGEST_MAGNITUDE = 1e-15, 1e9
 """Magnitudes between which ``Spread`` tells values apart; smaller ones count as 0."""
@@ -95,16 +95,18 @@ class Tally:
     def quantile(self, level: float) -> tuple[float, float, float]:
         """Quantile and the ends of its 95 % interval, identical to ``statistics.quantile`` of all values."""
         upto = np.cumsum(self.counts)
-        places = np.searchsorted(upto, np.array(ranks(int(upto[-1]), level)), side="right")
+        places = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), level)), side="right")
         low, high, most = (float(self.values[place]) for place in places)
         return low, high, most
 
 
 class Spread:
-    """Quantiles of the magnitudes of values (n, k), each within ACCURACY of the exact quantile; NaN is ignored."""
+    """Quantiles of the magnitudes of values (n, k), each within QUANTILE_ACCURACY of the exact quantile; NaN is
+    ignored.
+    """
 
     def __init__(self) -> None:
-        self._width = np.log1p(2.0 * ACCURACY / (1.0 - ACCURACY))
+        self._width = np.log1p(2.0 * QUANTILE_ACCURACY / (1.0 - QUANTILE_ACCURACY))
         self._bins = int(np.ceil(np.log(LARGEST_MAGNITUDE / SMALLEST_MAGNITUDE) / self._width)) + 2
         self._counts = np.zeros((0, self._bins), dtype=np.int64)
 
@@ -126,5 +128,5 @@ class Spread:
         upto = self._counts.cumsum(axis=1)
         wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
         place = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
-        middle = SMALLEST_MAGNITUDE * np.exp(self._width * place) * (1.0 - ACCURACY)
+        middle = SMALLEST_MAGNITUDE * np.exp(self._width * place) * (1.0 - QUANTILE_ACCURACY)
         return np.where(upto[:, -1] > 0, np.where(place == 0, 0.0, middle), np.nan)

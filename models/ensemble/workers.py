@@ -20,7 +20,7 @@ from threading import Thread
 from typing import Any, NamedTuple
 
 from models.core.errors import InputError
-from models.ensemble.store import code, named_files
+from models.ensemble.store import checksum_of_sources, named_files
 from models.machine.left_out import let_in
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
@@ -76,7 +76,7 @@ class Processes(Executor):
         self.shutdown(cancel_futures=kind is not None)
 
 
-def processes(workers: int) -> Processes:
+def process_pool(workers: int) -> Processes:
     """A pool of freshly started processes, since threads of engines and compilers do not survive a fork."""
     return Processes(workers)
 
@@ -123,7 +123,7 @@ def _end_with(pipe: Connection) -> None:
 
 DEFAULT_WORKERS = 2
 """Processes, if there are so many cores and nobody asks for another number; no result depends on it."""
-SCHEMES = ("tcp", "tls", "ws", "wss", "ucx", "inproc")
+SCHEDULER_SCHEMES = ("tcp", "tls", "ws", "wss", "ucx", "inproc")
 """Ways in which a Dask scheduler is reached."""
 SCHEDULER_TIMEOUT = "10s"
 """How long a scheduler has to answer."""
@@ -132,7 +132,7 @@ SCHEDULER_TIMEOUT = "10s"
 @dataclass(frozen=True)
 class Crew:
     """Where repeated computations run: ``workers`` processes of this machine, or all workers of the Dask
-    ``cluster``."""
+    ``dask_workers``."""
 
     workers: int
     cluster: str | None = None
@@ -152,13 +152,13 @@ class Crew:
         """The executor for a number of blocks; None where this process computes alone.
 
         places : files and folders that the workers read or write, too; InputError where those of a cluster do not see
-        them, or where ``cluster`` has something to refuse.
+        them, or where ``dask_workers`` has something to refuse.
         """
         if self.cluster is not None:
-            with cluster(self.cluster, *places) as executor:
+            with dask_workers(self.cluster, *places) as executor:
                 yield executor
         elif (workers := min(self.workers, blocks)) > 1:
-            with processes(workers) as executor:
+            with process_pool(workers) as executor:
                 yield executor
         else:
             yield None
@@ -171,11 +171,11 @@ def places_of(scene: Any) -> tuple[Path, ...]:
 
 
 @contextmanager
-def cluster(address: str, *places: Path) -> Iterator[Executor]:
+def dask_workers(address: str, *places: Path) -> Iterator[Executor]:
     """The workers of a Dask scheduler, such as ``tcp://host:8786``, where the same twinrig must be installed.
 
     Certificates of a ``tls://`` address are those of Dask's configuration. Raises InputError where the extra
-    ``cluster`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
+    ``dask_workers`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
     sources, with several threads (engines share their callbacks within a process), or without sight of ``places``.
     """
     let_in("dask")
@@ -186,8 +186,8 @@ def cluster(address: str, *places: Path) -> Iterator[Executor]:
     scheme, separator, host = address.partition("://")
     if not separator or not host:
         raise InputError("", "cluster", address, "must read SCHEME://HOST:PORT, for example tcp://host:8786")
-    if scheme not in SCHEMES:
-        raise InputError("", "cluster", scheme, "is no way to reach a scheduler", SCHEMES)
+    if scheme not in SCHEDULER_SCHEMES:
+        raise InputError("", "cluster", scheme, "is no way to reach a scheduler", SCHEDULER_SCHEMES)
     try:
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError) as error:
@@ -217,16 +217,16 @@ class OnCluster(Executor):
         if len(args) == 2:
             job, block = args
             if id(job) not in self._jobs:
-                self._jobs[id(job)] = job, self._client.submit(_same, job, pure=False)
+                self._jobs[id(job)] = job, self._client.submit(_identity, job, pure=False)
             args = self._jobs[id(job)][1], block
         return self._executor.submit(function, *args, **options)
 
 
-def _same(job: Any) -> Any:
+def _identity(job: Any) -> Any:
     return job
 
 
-class _Seen(NamedTuple):
+class _WorkerState(NamedTuple):
     """State of a cluster worker: checksum of its sources, number of threads, and paths that it cannot access."""
 
     sources: str
@@ -234,23 +234,23 @@ class _Seen(NamedTuple):
     missing: list[str]
 
 
-def _seen(places: tuple[Path, ...], dask_worker: Any = None) -> _Seen:
+def _worker_state(places: tuple[Path, ...], dask_worker: Any = None) -> _WorkerState:
     """State of the worker on which this runs, for paths ``places``; Dask prescribes the argument's name."""
     missing = [str(place) for place in places if not place.exists()]
-    return _Seen(code(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
+    return _WorkerState(checksum_of_sources(Path(__file__).parents[1]), dask_worker.state.nthreads, missing)
 
 
 def _require_alike(client: Any, address: str, places: tuple[Path, ...]) -> None:
     """Raise InputError if there is no worker, or if one would not compute the same results."""
     absolute = tuple(place.resolve() for place in places)
     try:
-        workers = client.run(_seen, absolute)
+        workers = client.run(_worker_state, absolute)
     except (ImportError, AttributeError) as error:
         allowed = f"its workers have no twinrig, or another one: {error}"
         raise InputError("", "cluster", address, allowed) from None
     if not workers:
         raise InputError("", "cluster", address, "no worker has joined this scheduler: start one, dask worker ADDRESS")
-    here = code(Path(__file__).parents[1])
+    here = checksum_of_sources(Path(__file__).parents[1])
     for worker, seen in workers.items():
         if seen.sources != here:
             allowed = "has another version of twinrig: install the same one on every machine"

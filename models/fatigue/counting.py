@@ -11,39 +11,39 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.fatigue.damage import checked_load, damage_sum, turning_points
-from models.fatigue.rainflow_cycles import cycles
+from models.fatigue.rainflow_cycles import rainflow_cycles
 
-LEVELS, RANGES = 64, 64
+LEVELS_OF_FIGURE, RANGES_OF_FIGURE = 64, 64
 """Of a figure: equal parts of the way from the smallest to the largest load."""
 
 
 @dataclass(frozen=True)
-class Counted:
+class CountedLoad:
     """Results of counting one load.
 
     damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
-    least that range; least, greatest : the load's extremes; mean.
+    least that range; smallest_load, largest_load : the load's extremes; mean.
     """
 
     damage: dict[float, float]
     levels: np.ndarray
     crossings: np.ndarray
     ranges: np.ndarray
-    pairs: np.ndarray
-    least: float
-    greatest: float
+    pairs_of_range: np.ndarray
+    smallest_load: float
+    largest_load: float
     mean: float
 
 
-def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Counted:
-    """``Counted`` of a load (n,); raises InputError for an empty load, or one that is not finite."""
+def counted_load(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> CountedLoad:
+    """``CountedLoad`` of a load (n,); raises InputError for an empty load, or one that is not finite."""
     load = checked_load(load)
     turns = turning_points(load)
-    spans, _, counts = cycles(turns)
+    spans, _, counts = rainflow_cycles(turns)
     least, greatest = float(load.min()), float(load.max())
-    levels = np.linspace(least, greatest, LEVELS + 1)
-    ranges = np.linspace(0.0, greatest - least, RANGES + 1)[1:]
-    return Counted(
+    levels = np.linspace(least, greatest, LEVELS_OF_FIGURE + 1)
+    ranges = np.linspace(0.0, greatest - least, RANGES_OF_FIGURE + 1)[1:]
+    return CountedLoad(
         {slope: damage_sum(spans, counts, slope) for slope in slopes},
         levels,
         level_crossings(turns, levels),
@@ -57,7 +57,7 @@ def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Coun
 
 def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Number of upward crossings of each level (l,) by a load (n,) or its turning points; levels may be in any order.
-    InputError as in ``count``, and for a level that is no number."""
+    InputError as in ``counted_load``, and for a level that is no number."""
     load, given = checked_load(load), np.asarray(levels, float)
     if np.isnan(given).any():
         raise InputError("", "levels", None, "must be numbers")

@@ -11,9 +11,9 @@ import numpy as np
 
 from models.core.errors import InputError
 
-SLOPE = 5.0
+WOEHLER_SLOPE = 5.0
 """Woehler exponent used where none is named."""
-CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
+COUNTING_CONVENTION = "rainflow after ASTM E1049-85, residue as half cycles"
 
 
 REST_RANGE_SHARE = 1e-9
@@ -62,20 +62,20 @@ def damage_sum(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
     return damage
 
 
-def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:
+def pseudo_damage(load: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
     """Sum of count times range^slope over the rainflow cycles of ``load`` (n,); unit: that of the load, to ``slope``.
 
     A load that never turns has none. Raises InputError for a load without a sample, or with one that is not
     finite: damage of a broken run is not a number to compare; for a slope that is not above 0; and where the damage
     is too large for a number.
     """
-    from models.fatigue.rainflow_cycles import cycles
+    from models.fatigue.rainflow_cycles import rainflow_cycles
 
-    spans, _, counts = cycles(turning_points(checked_load(load)))
+    spans, _, counts = rainflow_cycles(turning_points(checked_load(load)))
     return damage_sum(spans, counts, slope)
 
 
-def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = SLOPE) -> float:
+def damage_ratio(load: np.ndarray, truth: np.ndarray, slope: float = WOEHLER_SLOPE) -> float:
     """Ratio of a load's pseudo-damage (n,) to that of the true load (m,); raises InputError if the true load never
     varies."""
     whole = pseudo_damage(truth, slope)

@@ -6,7 +6,7 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")
-def cycles(turns):
+def rainflow_cycles(turns):
     """Ranges (c,), means (c,) and counts (c,) of the cycles of turning points (n,); open ones, the residue, count 0.5.
 
     Consecutive points differ and turn; the first and the last point of a load count among them.

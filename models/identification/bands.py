@@ -5,23 +5,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.identification.problem import Problem
-from models.identification.uncertainty import LEVEL, Uncertainty
+from models.identification.uncertainty import NORMAL_QUANTILE, Uncertainty
 
-SHARE = 0.95
+HELD_SHARE = 0.95
 """Of the residuals that the bands hold where they were made."""
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``reach`` holds SHARE of residuals."""
+    """A model's error: sqrt(base^2 + (share x prediction)^2) times ``band_factor`` holds HELD_SHARE of residuals."""
 
-    base: float
+    constant_error: float
     share: float
-    reach: float
+    band_factor: float
 
     def half_width(self, predicted: np.ndarray) -> np.ndarray:
         """Half-widths (n,) of the band around predictions (n,)."""
-        return self.reach * np.sqrt(self.base**2 + (self.share * predicted) ** 2)
+        return self.band_factor * np.sqrt(self.constant_error**2 + (self.share * predicted) ** 2)
 
 
 def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
@@ -35,7 +35,9 @@ def error_model(residuals: np.ndarray, predicted: np.ndarray) -> ErrorModel:
     model = ErrorModel(float(np.sqrt(base / sizes[0])), float(np.sqrt(share / sizes[1])), 1.0)
     size = model.half_width(predicted)
     floor = 1e-12 * float(np.abs(residuals).max() or 1.0)
-    return ErrorModel(model.base, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), SHARE)))
+    return ErrorModel(
+        model.constant_error, model.share, float(np.quantile(np.abs(residuals) / np.maximum(size, floor), HELD_SHARE))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,31 +48,31 @@ class Bands:
     predicted: np.ndarray
     half_width: np.ndarray
 
-    def inside(self) -> np.ndarray:
+    def share_inside(self) -> np.ndarray:
         """Share (channels,) of the measured samples that lie inside the band."""
-        return self._mean(np.abs(self._error()) <= self.half_width)
+        return self._mean_over_samples(np.abs(self._error()) <= self.half_width)
 
-    def rms(self) -> np.ndarray:
+    def error_rms(self) -> np.ndarray:
         """Root mean square (channels,) of prediction less measurement."""
-        return np.sqrt(self._mean(self._error() ** 2))
+        return np.sqrt(self._mean_over_samples(self._error() ** 2))
 
-    def relative(self) -> np.ndarray:
+    def relative_error(self) -> np.ndarray:
         """Ratio (channels,) of the rms error to the root mean square of the measurement."""
-        return self.rms() / np.array([channel.size for channel in self.problem.channels])
+        return self.error_rms() / np.array([channel.size for channel in self.problem.channels])
 
     def width(self) -> np.ndarray:
         """Ratio (channels,) of the mean half-width to the rms error."""
-        return self._mean(self.half_width) / self.rms()
+        return self._mean_over_samples(self.half_width) / self.error_rms()
 
     def _error(self) -> np.ndarray:
         return self.predicted - np.array([channel.values for channel in self.problem.channels])
 
-    def _mean(self, values: np.ndarray) -> np.ndarray:
-        used = [channel.used for channel in self.problem.channels]
+    def _mean_over_samples(self, values: np.ndarray) -> np.ndarray:
+        used = [channel.is_used for channel in self.problem.channels]
         return np.array([row[part].mean() for row, part in zip(values, used, strict=True)])
 
 
-def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
+def error_bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) -> Bands:
     """Bands for a stretch of measurement; ``problem`` is the fit's problem with the drive and the measurement of that
     stretch."""
     values = uncertainty.fit.values
@@ -78,4 +80,4 @@ def bands(problem: Problem, uncertainty: Uncertainty, errors: list[ErrorModel]) 
     slopes = problem.jacobian(values, problem.predicted)
     variance = np.einsum("cnp,pq,cnq->cn", slopes, uncertainty.covariance, slopes)
     own = np.array([model.half_width(row) for model, row in zip(errors, predicted, strict=True)])
-    return Bands(problem, predicted, np.sqrt(own**2 + LEVEL**2 * np.clip(variance, 0.0, None)))
+    return Bands(problem, predicted, np.sqrt(own**2 + NORMAL_QUANTILE**2 * np.clip(variance, 0.0, None)))

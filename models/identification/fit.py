@@ -8,16 +8,16 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.ensemble.store import Store
-from models.identification.problem import FAILED, Problem
+from models.identification.problem import FAILED_RESIDUAL, Problem
 
-STAGE, MOST_STAGES = 4, 20
+TRIALS_OF_STAGE, MOST_STAGES = 4, 20
 """Trials of a stage, and stages of a fit."""
 COST_DECREASE = 1e-4
 """Relative decrease of the cost in a stage at which a fit ends: with the residuals of a hundred corners, which count
 once each, estimates then move by a tenth of their standard errors at most."""
-INSIDE = 1e-6
+INSIDE_BOUNDS_STEP = 1e-6
 """Scales by which a start lies inside its bounds."""
-Told = Callable[[str, float], None]
+StageProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Fit:
 def fit(
     problem: Problem,
     stage_store: Store | None = None,
-    tell: Told = lambda text, share: None,
+    tell: StageProgress = lambda text, share: None,
     first: int = 0,
     executor: Executor | None = None,
 ) -> Fit:
@@ -57,7 +57,7 @@ def fit(
         if stage_store is not None and stage_store.has(first + stage):
             block = stage_store.load(first + stage)
         else:
-            block = _stage(problem, values, executor)
+            block = _one_stage(problem, values, executor)
             if stage_store is not None:
                 stage_store.save(first + stage, block)
         values, before, cost = block["values"], cost, float(block["cost"])
@@ -79,13 +79,13 @@ def _done_share(stage: int, previous_cost: float, cost: float) -> float:
     return 0.9 * max(settled, stage / MOST_STAGES)
 
 
-def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
+def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> dict[str, np.ndarray]:
     """One stage of the fit: a few iterations that start from ``values``."""
     from scipy.optimize import least_squares
 
     scale, (low, high), residuals = problem.scale, problem.bounds, problem.residuals
-    begin = np.clip(values / scale, low / scale + INSIDE, high / scale - INSIDE)
-    if np.abs(residuals(begin * scale)).max() >= FAILED:
+    begin = np.clip(values / scale, low / scale + INSIDE_BOUNDS_STEP, high / scale - INSIDE_BOUNDS_STEP)
+    if np.abs(residuals(begin * scale)).max() >= FAILED_RESIDUAL:
         names = ", ".join(f"{each.name} = {value:.4g}" for each, value in zip(problem.parameters, values, strict=True))
         raise InputError("identify", "start", names, "the model fails at these values: start from others")
     solved = least_squares(
@@ -93,7 +93,7 @@ def _stage(problem: Problem, values: np.ndarray, executor: Executor | None) -> d
         begin,
         jac=lambda x: problem.jacobian(x * scale, residuals, executor).reshape(-1, len(x)),
         bounds=(low / scale, high / scale),
-        max_nfev=STAGE,
+        max_nfev=TRIALS_OF_STAGE,
         ftol=0.1 * COST_DECREASE,
         xtol=1e-8,
         gtol=1e-12,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.identification.bands import Bands, ErrorModel, bands, error_model
+from models.identification.bands import Bands, ErrorModel, error_bands, error_model
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
@@ -32,29 +32,31 @@ class Identified:
     """Results for one vehicle: the fit, the errors on parts of the data that were not used in the fit, and the
     prediction."""
 
-    known: Uncertainty
+    uncertainty: Uncertainty
     errors: list[ErrorModel]
-    crossed: np.ndarray
+    cross_validation_errors: np.ndarray
     bands: Bands
 
 
-def identified(first: Any, second: Any, search: Search, progress: Progress = lambda text, share: None) -> Identified:
+def identified_vehicle(
+    first: Any, second: Any, search: Search, progress: Progress = lambda text, share: None
+) -> Identified:
     """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
     with bands."""
-    problem = _problem(first, search)
+    problem = _fit_problem(first, search)
     solved = fit(problem, tell=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
     crossed = cross_validated(solved, search.blocks, progress)
     predicted = problem.predicted(solved.values)
     errors = [
-        error_model(row[channel.used], model[channel.used])
+        error_model(row[channel.is_used], model[channel.is_used])
         for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
     ]
     progress("the prediction", 0.9)
-    return Identified(known, errors, crossed, bands(_problem(second, search), known, errors))
+    return Identified(known, errors, crossed, error_bands(_fit_problem(second, search), known, errors))
 
 
-def _problem(scene: Any, search: Search) -> Problem:
+def _fit_problem(scene: Any, search: Search) -> Problem:
     whole = problem_of(scene, scene.path(scene.drive.file), search.parameters, low_pass=search.low_pass)
     channels = {channel.name: channel for channel in whole.channels}
     missing = next((name for name in search.channels if name not in channels), None)
@@ -69,7 +71,7 @@ def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
     target = np.array([channel.values for channel in problem.channels])
     answer = np.empty_like(target)
     part = np.minimum((count * np.arange(len(times))) // len(times), count - 1)
-    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside(solved), strict=True)]
+    starts = [replace(each, start=float(v)) for each, v in zip(problem.parameters, _inside_bounds(solved), strict=True)]
     for k in range(count):
         progress(f"part {k + 1} of {count}, predicted from the others", 0.4 + 0.5 * k / count)
         others = Problem(problem.model, starts, problem.channels, problem.clock, part != k)
@@ -78,7 +80,7 @@ def cross_validated(solved: Fit, count: int, progress: Progress) -> np.ndarray:
     return answer
 
 
-def _inside(fit: Fit) -> np.ndarray:
+def _inside_bounds(fit: Fit) -> np.ndarray:
     low, high = fit.problem.bounds
     margin = 1e-3 * fit.problem.scale
     return np.clip(fit.values, low + margin, high - margin)

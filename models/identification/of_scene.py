@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from models.core.errors import InputError, RunFailed, suggestion
+from models.core.errors import InputError, RunFailed, suggestion_phrase
 from models.core.result import Result
 from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS, of_table
 from models.identification.problem import ChannelOnClock, Curve, FitClock, Parameter, Problem, measured_channel
 from models.measured.channel import Source
-from models.measured.curve import curve
+from models.measured.curve import channel_curve
 from models.measured.formats import open_source
 
-OPTION = "--parameters"
-SHORTER = 50.0
+PARAMETERS_OPTION = "--parameters"
+TRIAL_RUN_FRACTION = 50.0
 """Part of a scene's duration whose run tells the names of its channels."""
 
 
-def parameter(scene: Any, text: str) -> Parameter:
+def parameter_of_scene(scene: Any, text: str) -> Parameter:
     """Parameter from KEY or KEY=LOW:HIGH of a scene, whose value is the start; without a range, the limits of the
     scene's table.
 
@@ -33,20 +33,20 @@ def parameter(scene: Any, text: str) -> Parameter:
     key, equals, span = (part.strip() for part in text.partition("="))
     start, low, high = scene_value(scene, key)
     if equals:
-        low, high = _range(key, span)
+        low, high = _low_and_high(key, span)
     return Parameter(key, start, low, high)
 
 
-def _range(key: str, span: str) -> tuple[float, float]:
+def _low_and_high(key: str, span: str) -> tuple[float, float]:
     """LOW:HIGH as two numbers; either may be infinite."""
     try:
         low, high = (float(end) for end in span.split(":"))
     except ValueError:
-        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH, two numbers") from None
+        raise InputError(PARAMETERS_OPTION, key, span, "a range reads KEY=LOW:HIGH, two numbers") from None
     if np.isnan(low) or np.isnan(high):
-        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH: both must be numbers")
+        raise InputError(PARAMETERS_OPTION, key, span, "a range reads KEY=LOW:HIGH: both must be numbers")
     if not low < high:
-        raise InputError(OPTION, key, span, "a range reads KEY=LOW:HIGH: LOW must be below HIGH")
+        raise InputError(PARAMETERS_OPTION, key, span, "a range reads KEY=LOW:HIGH: LOW must be below HIGH")
     return low, high
 
 
@@ -55,10 +55,10 @@ def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
     owner: Any = scene
     *tables, last = key.split(".")
     for table in tables:
-        owner = _inside(owner, table, key)
-    value = _inside(owner, last, key)
+        owner = _value_at_key(owner, table, key)
+    value = _value_at_key(owner, last, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(OPTION, key, None, "holds no number: a parameter is a number of the scene")
+        raise InputError(PARAMETERS_OPTION, key, None, "holds no number: a parameter is a number of the scene")
     field = type(owner).model_fields.get(last) if isinstance(owner, BaseModel) else None
     limits = field.metadata if field is not None else []
     low = max((float(each) for limit in limits for each in _limit_ends(limit, "gt", "ge")), default=-np.inf)
@@ -72,20 +72,22 @@ def _limit_ends(limit: Any, *names: str) -> list[float]:
     return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
 
-def _inside(owner: Any, name: str, key: str) -> Any:
+def _value_at_key(owner: Any, name: str, key: str) -> Any:
     if isinstance(owner, list) and name.isdecimal() and int(name) < len(owner):
         return owner[int(name)]
     if isinstance(owner, Mapping) and name in owner:
         return owner[name]
     if isinstance(owner, BaseModel) and name in type(owner).model_fields:
         return getattr(owner, name)
-    names = _names(owner)
-    if isinstance(owner, Mapping) and not suggestion(name, names):
-        raise InputError(OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from")
-    raise InputError(OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
+    names = _channel_names(owner)
+    if isinstance(owner, Mapping) and not suggestion_phrase(name, names):
+        raise InputError(
+            PARAMETERS_OPTION, key, None, f"is not in the scene: --set {key}=VALUE gives it a value to start from"
+        )
+    raise InputError(PARAMETERS_OPTION, key, None, f"is no key of the scene: there is no {name!r}", names)
 
 
-def _names(owner: Any) -> tuple[str, ...]:
+def _channel_names(owner: Any) -> tuple[str, ...]:
     if isinstance(owner, BaseModel):
         return tuple(name for name, field in type(owner).model_fields.items() if not field.exclude)
     return tuple(map(str, owner)) if isinstance(owner, Mapping) else ()
@@ -141,16 +143,16 @@ def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
     duration = table.get("run", {}).get("duration")
     if not isinstance(duration, int | float):
         return
-    set_key(table, "run.duration", duration / SHORTER)
+    set_key(table, "run.duration", duration / TRIAL_RUN_FRACTION)
     try:
         short = of_table(table, scene.file, Path(scene.folder))
         names = over_time(import_module(f"{SYSTEMS[scene.system].package}.run").run(short, engine))
     except (InputError, RunFailed):
         return
-    _named(source, measurement, tuple(names))
+    _channels_with_names(source, measurement, tuple(names))
 
 
-def _named(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
+def _channels_with_names(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
     """Channels of a measurement that have one of these names; InputError if there are none."""
     named = [channel.name for channel in source.channels if channel.name in names]
     if not named:
@@ -159,14 +161,14 @@ def _named(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str
     return named
 
 
-def curves(path: str | Path, units: Mapping[str, str]) -> dict[str, Curve]:
+def measured_curves(path: str | Path, units: Mapping[str, str]) -> dict[str, Curve]:
     """Channels of a measurement whose names are keys of ``units``, converted to the unit given there.
 
     Raises InputError where there is none, for a unit that does not fit, and for times that go back.
     """
     source = open_source(path)
-    named = _named(source, path, tuple(units))
-    return {name: curve(source, name, units[name]) for name in named}
+    named = _channels_with_names(source, path, tuple(units))
+    return {name: channel_curve(source, name, units[name]) for name in named}
 
 
 def problem_of(
@@ -176,22 +178,26 @@ def problem_of(
 
     low_pass : Hz, of model and measurement alike, without phase; 0 for none. Times of both are the same clock.
     """
-    asked = [parameter(scene, text) for text in parameters]
+    asked = [parameter_of_scene(scene, text) for text in parameters]
     for i, each in enumerate(asked):
         if each.name in [other.name for other in asked[:i]]:
-            raise InputError(OPTION, each.name, None, "is named twice")
+            raise InputError(PARAMETERS_OPTION, each.name, None, "is named twice")
     model = SceneModel(scene, [each.name for each in asked], engine)
     _check_names(scene, measurement, engine)
     first = over_time(model.result(np.array([each.start for each in asked])))
-    read = curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
-    clock = _clock([first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement)
+    read = measured_curves(measurement, {name: unit for name, (unit, _, _) in first.items()})
+    clock = _shared_clock(
+        [first[name][1] for name in read], [times for times, _ in read.values()], low_pass, measurement
+    )
     channels: list[ChannelOnClock] = [
         measured_channel(name, first[name][0], samples, clock, str(measurement)) for name, samples in read.items()
     ]
     return Problem(model, asked, channels, clock)
 
 
-def _clock(ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path) -> FitClock:
+def _shared_clock(
+    ours: list[np.ndarray], theirs: list[np.ndarray], low_pass: float, measurement: str | Path
+) -> FitClock:
     """Time grid in the interval shared by the run and all measured channels; its step is the shortest in the
     measurement."""
     begin = max(float(times[0]) for times in (*ours, *theirs))

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.ensemble.runner import block_results
 from models.measured.outliers import without_outliers
 
-FAILED = 1e3
+FAILED_RESIDUAL = 1e3
 """Residual of every sample where a model fails at trial values, so that a search turns back."""
-OVERSAMPLED = 4.0
+SAMPLES_PER_PERIOD = 4.0
 """Samples that are kept for each period of the low-pass."""
 FEWEST_SAMPLES = 32
 """Samples of a channel that a fit needs."""
@@ -43,9 +43,9 @@ class Parameter:
             allowed = f"must start between its bounds, {self.low:g} and {self.high:g}"
             raise InputError("--parameters", self.name, self.start, allowed)
         if self.scale <= 0.0:
-            object.__setattr__(self, "scale", self._scale())
+            object.__setattr__(self, "scale", self._default_scale())
 
-    def _scale(self) -> float:
+    def _default_scale(self) -> float:
         if self.start != 0.0:
             return abs(self.start)
         if np.isfinite(self.high - self.low):
@@ -56,11 +56,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class FitClock:
-    """times (n,) : s, even; edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the samples
-    that residuals keep."""
+    """times (n,) : s, even; low_pass_edge : of the low-pass on model and measurement (Hz), 0 for none; stride : of the
+    samples that residuals keep."""
 
     times: np.ndarray
-    edge: float = 0.0
+    low_pass_edge: float = 0.0
 
     @property
     def period(self) -> float:
@@ -71,30 +71,34 @@ class FitClock:
     def stride(self) -> int:
         """Interval, in samples, between the samples that residuals keep; after the low-pass, the signal hardly changes
         in between."""
-        return max(1, int(1.0 / (OVERSAMPLED * self.edge * self.period) + 1e-9)) if self.edge > 0.0 else 1
+        return (
+            max(1, int(1.0 / (SAMPLES_PER_PERIOD * self.low_pass_edge * self.period) + 1e-9))
+            if self.low_pass_edge > 0.0
+            else 1
+        )
 
     def filtered(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) after the low-pass filter."""
-        if self.edge <= 0.0:
+        if self.low_pass_edge <= 0.0:
             return values
-        return smoothed(values[:, None], self.period, self.edge, "", "--low-pass")[:, 0]
+        return low_passed(values[:, None], self.period, self.low_pass_edge, "", "--low-pass")[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelOnClock:
-    """One channel on the clock: values (n,), low-passed; used (n,) : which of them count; left_out : samples of the
+    """One channel on the clock: values (n,), low-passed; is_used (n,) : which of them count; left_out : samples of the
     file that were spikes or not measured."""
 
     name: str
     unit: str
     values: np.ndarray
-    used: np.ndarray
+    is_used: np.ndarray
     left_out: int
 
     @cached_property
     def size(self) -> float:
         """Root mean square of the used samples, to which residuals are related."""
-        return float(np.sqrt(np.mean(self.values[self.used] ** 2)))
+        return float(np.sqrt(np.mean(self.values[self.is_used] ** 2)))
 
 
 def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place: str = "") -> ChannelOnClock:
@@ -107,7 +111,7 @@ def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place:
         allowed = f"samples between {clock.times[0]:g} and {clock.times[-1]:g} s: at least {FEWEST_SAMPLES} are needed"
         raise InputError(place, name, int(inside.sum()), allowed)
     period = max(float(np.median(np.diff(times))), clock.period)
-    nearest = np.abs(times[known][_nearest(times[known], clock.times)] - clock.times)
+    nearest = np.abs(times[known][_nearest_sample(times[known], clock.times)] - clock.times)
     used = nearest <= 1.5 * period
     smooth = clock.filtered(np.interp(clock.times, times[known], values[known]))
     if not np.any(smooth[used]):
@@ -115,7 +119,7 @@ def measured_channel(name: str, unit: str, curve: Curve, clock: FitClock, place:
     return ChannelOnClock(name, unit, smooth, used, int(len(raw) - known.sum()))
 
 
-def _nearest(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _nearest_sample(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
     return right - (wanted - times[right - 1] < times[right] - wanted)
 
@@ -180,7 +184,7 @@ class Problem:
     def weights(self) -> np.ndarray:
         """Weights (channels, m): 0 for samples that do not count."""
         every, part = slice(None, None, self.clock.stride), self.taking_part
-        rows = [channel.used & (True if part is None else part) for channel in self.channels]
+        rows = [channel.is_used & (True if part is None else part) for channel in self.channels]
         return np.array([row[every] / channel.size for row, channel in zip(rows, self.channels, strict=True)])
 
     @cached_property
@@ -189,12 +193,12 @@ class Problem:
         return np.array([channel.values[:: self.clock.stride] for channel in self.channels])
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """Residuals (channels, m): prediction less measurement, divided by the channel's size; FAILED where the model
-        fails."""
+        """Residuals (channels, m): prediction less measurement, divided by the channel's size; FAILED_RESIDUAL where
+        the model fails."""
         try:
             predicted = self.predicted(values)[:, :: self.clock.stride]
         except RunFailed:
-            return np.where(self.weights > 0.0, FAILED, 0.0)
+            return np.where(self.weights > 0.0, FAILED_RESIDUAL, 0.0)
         return (predicted - self.target) * self.weights
 
     def jacobian(
@@ -206,20 +210,20 @@ class Problem:
         of : what is derived, the residuals if nothing else is named; executor : computes its columns.
         """
         answer = self.residuals if of is None else of
-        ways = [self._ways(values, k) for k in range(len(self.parameters))]
+        ways = [self._difference_steps(values, k) for k in range(len(self.parameters))]
         base, there = answer(values), block_results(answer, [way[0][0] for way in ways], executor)
-        again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED]
+        again = [k for k, way in enumerate(ways) if way[1:] and np.abs(there[k]).max() >= FAILED_RESIDUAL]
         chosen = [way[1 if k in again else 0] for k, way in enumerate(ways)]
         for k, moved in zip(again, block_results(answer, [chosen[k][0] for k in again], executor), strict=True):
             there[k] = moved
         columns = [(row - base) / change for row, (_, change) in zip(there, chosen, strict=True)]
         return np.stack(columns, axis=-1)
 
-    def _ways(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
+    def _difference_steps(self, values: np.ndarray, k: int) -> list[tuple[np.ndarray, float]]:
         """Steps for difference quotients: values (p,) with parameter ``k`` moved forward, then backward, and the step
         divided by its scale. Steps stay within the bounds; near the upper one the backward step comes first."""
         each, ways = self.parameters[k], list[tuple[np.ndarray, float]]()
-        step = STEP * each.scale * (-1.0 if values[k] + STEP * each.scale > each.high else 1.0)
+        step = DIFFERENCE_STEP * each.scale * (-1.0 if values[k] + DIFFERENCE_STEP * each.scale > each.high else 1.0)
         for signed in (step, -step):
             moved = values.copy()
             moved[k] += signed
@@ -227,5 +231,5 @@ class Problem:
         return [way for way in ways if each.low <= way[0][k] <= each.high] or ways[:1]
 
 
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Of differences, by the scale of a parameter."""

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
 
-BLIND = 1e-6
+BLIND_SHARE = 1e-6
 """Share of the largest singular value of a fit's sensitivities below which a combination is not determined."""
-STEP, LEAST_VALUE = 1e-4, 0.1
+DIFFERENCE_STEP, LEAST_VALUE = 1e-4, 0.1
 """Of differences, by a value, which counts as LEAST_VALUE at least."""
 HIGH_CORRELATION = 0.9
 """Correlation of two estimates from which on they are hard to tell apart."""
@@ -72,7 +72,7 @@ class Subset:
         here = predict(self.named)
         slopes = np.zeros((len(here), len(self.names)))
         for i, (name, value) in enumerate(self.named.items()):
-            step = STEP * max(abs(value), LEAST_VALUE)
+            step = DIFFERENCE_STEP * max(abs(value), LEAST_VALUE)
             slopes[:, i] = (predict(self.named | {name: value + step}) - here) / step
         return here, np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes)
 
@@ -82,39 +82,39 @@ class Choice:
     """All subsets of parameters in the order of their criterion, their weights (probabilities), and the inflation
     factor c of chi^2.
 
-    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart; blind : parameters
-    on which no measured number depends.
+    calls : of each parameter (F, p) of leaving it out of the fullest subset that can be told apart;
+    undetermined_parameters : parameters on which no measured number depends.
     """
 
-    fits: list[Subset]
+    subset_fits: list[Subset]
     criteria: np.ndarray
     weights: np.ndarray
-    inflation: float
+    variance_inflation: float
     calls: dict[str, tuple[float, float]]
-    blind: tuple[str, ...]
+    undetermined_parameters: tuple[str, ...]
 
     @property
-    def best(self) -> Subset:
+    def best_subset(self) -> Subset:
         """The subset with the lowest criterion."""
-        return self.fits[0]
+        return self.subset_fits[0]
 
     def importance(self, name: str) -> float:
         """Sum of the weights of all subsets that contain the parameter."""
-        return float(sum(w for fit, w in zip(self.fits, self.weights, strict=True) if name in fit.names))
+        return float(sum(w for fit, w in zip(self.subset_fits, self.weights, strict=True) if name in fit.names))
 
     def forecast(self, predict: Callable[[dict[str, float]], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Predictions (m,) averaged over all subsets with their weights, and their standard deviations (m,).
 
         The variance is that within the subsets and that among them (Burnham and Anderson, ch. 4.3).
         """
-        means, variances = map(np.array, zip(*(fit.spread(predict) for fit in self.fits), strict=True))
+        means, variances = map(np.array, zip(*(fit.spread(predict) for fit in self.subset_fits), strict=True))
         mean = self.weights @ means
-        return mean, np.sqrt(self.weights @ (self.inflation * variances + (means - mean) ** 2))
+        return mean, np.sqrt(self.weights @ (self.variance_inflation * variances + (means - mean) ** 2))
 
     def hard_to_tell_apart(self) -> list[tuple[str, str, float]]:
         """Pairs of parameters whose estimates in the fullest subset have a correlation above HIGH_CORRELATION, with
         that correlation."""
-        fullest = max(self.fits, key=lambda fit: len(fit.names))
+        fullest = max(self.subset_fits, key=lambda fit: len(fit.names))
         size = np.sqrt(np.diag(fullest.covariance))
         pairs = combinations(range(len(size)), 2)
         each = [(i, j, float(fullest.covariance[i, j] / (size[i] * size[j]))) for j, i in pairs]
@@ -137,13 +137,13 @@ def fit_all(deviations: Deviations, candidates: Mapping[str, Candidate]) -> Subs
         method="dogbox",
     )
     _, sizes, rows = np.linalg.svd(fit.jac * scale)
-    told = sizes > BLIND * max(sizes.max(initial=0.0), 1e-300)
+    told = sizes > BLIND_SHARE * max(sizes.max(initial=0.0), 1e-300)
     covariance = (rows[: len(sizes)][told].T / sizes[told] ** 2) @ rows[: len(sizes)][told] * np.outer(scale, scale)
     undetermined = tuple(_combination(names, row) for row in rows[np.count_nonzero(told) :])
     return Subset(names, fit.x, covariance, float(np.sum(fit.fun**2)), len(fit.fun), undetermined)
 
 
-def chosen(
+def ranked_subsets(
     deviations: Deviations, candidates: Mapping[str, Candidate], together: Mapping[str, Sequence[str]] | None = None
 ) -> Choice:
     """Fits of every subset of the candidates, ranked; together : named sets of candidates whose joint removal is
@@ -159,11 +159,11 @@ def chosen(
     kept = sorted(determined, key=lambda fit: fit.criterion(inflation))
     criteria = np.array([fit.criterion(inflation) for fit in kept])
     weights = np.exp(-0.5 * (criteria - criteria[0]))
-    calls = _calls(fits, fullest, inflation, together or {})
+    calls = _removal_tests(fits, fullest, inflation, together or {})
     return Choice(kept, criteria, weights / weights.sum(), inflation, calls, blind)
 
 
-def _calls(
+def _removal_tests(
     fits: list[Subset], fullest: Subset, inflation: float, together: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[float, float]]:
     """F statistic and p value for removing each parameter, and each named set, from the fullest subset."""

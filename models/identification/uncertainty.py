@@ -16,19 +16,19 @@ import numpy as np
 from models.identification.fit import Fit, fit, fit_with_held
 from models.identification.problem import Problem
 
-LAGS = 4.0
+LONGEST_LAG_FACTOR = 4.0
 """Times that residuals stay alike, of the longest lag."""
 MOST_LAGS = 0.1
 """Share of all samples that the longest lag may be."""
-LEVEL = 1.96
+NORMAL_QUANTILE = 1.96
 """Standard deviations of 95 %."""
-SINGULAR = 1e-12
+SINGULAR_SHARE = 1e-12
 """Of the largest eigenvalue of the information: what is lower tells nothing."""
-DETERMINED = 1.0
+DETERMINED_HALF_WIDTH = 1.0
 """Of its scale: the half-width of 95 % from which on a parameter counts as not determined."""
 CHI_SQUARE = 3.841
 """95 % of one degree of freedom."""
-PROFILE = (-2.0, -1.0, 1.0, 2.0)
+PROFILE_DEVIATIONS = (-2.0, -1.0, 1.0, 2.0)
 """Standard deviations at which a profile is computed."""
 
 
@@ -36,46 +36,46 @@ PROFILE = (-2.0, -1.0, 1.0, 2.0)
 class Uncertainty:
     """Uncertainty of fitted parameters, each in its scale: covariance (p, p), information matrix H (p, p).
 
-    free (p,) : estimates that lie at no bound; the others have no covariance.
+    at_no_bound (p,) : estimates that lie at no bound; the others have no covariance.
     """
 
     fit: Fit
     covariance: np.ndarray
     information: np.ndarray
-    free: np.ndarray
-    staying: float
+    at_no_bound: np.ndarray
+    correlation_time: float
 
     @cached_property
     def deviations(self) -> np.ndarray:
         """Standard errors (p,) in the units of the parameters; infinite for parameters that the data do not
         determine."""
         spread = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None)) * self.fit.problem.scale
-        return np.where(self.free, spread, np.nan)
+        return np.where(self.at_no_bound, spread, np.nan)
 
     @cached_property
-    def determined(self) -> np.ndarray:
+    def is_determined(self) -> np.ndarray:
         """For each parameter (p,): whether its 95 % interval is narrower than its scale, and is not cut off by a
         bound."""
         with np.errstate(invalid="ignore"):
-            narrow = LEVEL * self.deviations < DETERMINED * self.fit.problem.scale
-        return self.free & narrow
+            narrow = NORMAL_QUANTILE * self.deviations < DETERMINED_HALF_WIDTH * self.fit.problem.scale
+        return self.at_no_bound & narrow
 
     @cached_property
     def condition(self) -> float:
         """Ratio of the largest to the smallest standard deviation among combinations of parameters, from the
         information matrix."""
-        values = np.linalg.eigvalsh(self.information[np.ix_(self.free, self.free)])
-        return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR * values[-1] else np.inf
+        values = np.linalg.eigvalsh(self.information[np.ix_(self.at_no_bound, self.at_no_bound)])
+        return float(np.sqrt(values[-1] / values[0])) if values[0] > SINGULAR_SHARE * values[-1] else np.inf
 
     def combinations(self) -> list[tuple[float, np.ndarray]]:
         """Uncorrelated combinations of scaled parameters: standard error and direction (p,) of each, the best
         determined first."""
-        inner = np.ix_(self.free, self.free)
+        inner = np.ix_(self.at_no_bound, self.at_no_bound)
         values, vectors = np.linalg.eigh(self.covariance[inner])
         answer = []
         for value, vector in zip(values, vectors.T, strict=True):
-            whole = np.zeros(len(self.free))
-            whole[self.free] = vector * np.sign(vector[np.argmax(np.abs(vector))])
+            whole = np.zeros(len(self.at_no_bound))
+            whole[self.at_no_bound] = vector * np.sign(vector[np.argmax(np.abs(vector))])
             answer.append((float(np.sqrt(max(value, 0.0))), whole))
         return answer
 
@@ -91,23 +91,23 @@ def uncertainty(fit: Fit, executor: Executor | None = None) -> Uncertainty:
     covariance = np.zeros_like(inner)
     part = np.ix_(free, free)
     if free.any():
-        inverse = _inverse(inner[part])
-        both = _long_run(scores[:, free], lags), _stationary(jacobian[:, :, free], fit.residuals, lags)
+        inverse = _information_inverse(inner[part])
+        both = _long_run(scores[:, free], lags), _stationary_covariance(jacobian[:, :, free], fit.residuals, lags)
         covariance[part] = inverse @ _larger_covariance(*both) @ inverse
-        covariance[part] += _untold(inner[part])
+        covariance[part] += _untold_variance(inner[part])
     return Uncertainty(fit, covariance, inner, free, staying * problem.clock.stride * problem.clock.period)
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
+def _information_inverse(matrix: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(matrix)
-    known = values > SINGULAR * values[-1]
+    known = values > SINGULAR_SHARE * values[-1]
     return (vectors[:, known] / values[known]) @ vectors[:, known].T
 
 
-def _untold(matrix: np.ndarray) -> np.ndarray:
+def _untold_variance(matrix: np.ndarray) -> np.ndarray:
     """Very large variance for parameter directions that do not affect the residuals."""
     values, vectors = np.linalg.eigh(matrix)
-    blind = vectors[:, values <= SINGULAR * values[-1]]
+    blind = vectors[:, values <= SINGULAR_SHARE * values[-1]]
     return 1e12 * blind @ blind.T
 
 
@@ -124,7 +124,7 @@ def _longest_lags(residuals: np.ndarray) -> tuple[int, float]:
             negative = np.flatnonzero(alike <= 0.0)
             staying = max(staying, float(1.0 + 2.0 * alike[1 : negative[0] if len(negative) else count].sum()))
     most = max(1, int(MOST_LAGS * residuals.shape[1]))
-    return min(most, int(np.ceil(LAGS * staying))), staying
+    return min(most, int(np.ceil(LONGEST_LAG_FACTOR * staying))), staying
 
 
 def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
@@ -138,7 +138,7 @@ def _long_run(scores: np.ndarray, lags: int) -> np.ndarray:
     return total * count / max(count - p, 1)
 
 
-def _stationary(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
+def _stationary_covariance(jacobian: np.ndarray, residuals: np.ndarray, lags: int) -> np.ndarray:
     """Long-run covariance (p, p) as in ``_long_run``, for stationary residuals: from each channel's own
     autocovariance."""
     total = np.zeros((jacobian.shape[2],) * 2)
@@ -154,7 +154,7 @@ def _larger_covariance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
     residuals are large, but scatter more."""
     values, vectors = np.linalg.eigh(second)
-    values = np.maximum(values, SINGULAR * values[-1])
+    values = np.maximum(values, SINGULAR_SHARE * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
     ratios, turned = np.linalg.eigh(back @ first @ back)
     return root @ (turned * np.maximum(ratios, 1.0)) @ turned.T @ root
@@ -171,22 +171,22 @@ class LikelihoodProfile:
     parabola: np.ndarray
 
     @property
-    def quadratic(self) -> bool:
+    def is_quadratic(self) -> bool:
         """Whether profile and parabola agree to within one half; the standard error then describes the uncertainty
         fully."""
         return bool(np.all(np.abs(self.rise - self.parabola) <= 0.5 * np.maximum(self.parabola, 1.0)))
 
 
-def profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
+def likelihood_profile(uncertainty: Uncertainty, k: int) -> LikelihoodProfile:
     """Profile likelihood of parameter ``k``. The misfit is weighted as in the covariance, so that correlated residuals
     do not count as independent ones."""
     solved, problem = uncertainty.fit, uncertainty.fit.problem
     scale, parameter = problem.scale[k], problem.parameters[k]
     spread = uncertainty.deviations[k] if np.isfinite(uncertainty.deviations[k]) else scale
     spread = min(spread, 0.5 * scale)
-    naive = _inverse(uncertainty.information)[k, k] * scale**2
+    naive = _information_inverse(uncertainty.information)[k, k] * scale**2
     weight = naive / uncertainty.deviations[k] ** 2 if np.isfinite(uncertainty.deviations[k]) and naive > 0.0 else 1.0
-    values = [v for v in solved.values[k] + spread * np.array(PROFILE) if parameter.low < v < parameter.high]
+    values = [v for v in solved.values[k] + spread * np.array(PROFILE_DEVIATIONS) if parameter.low < v < parameter.high]
     rises = []
     for value in values:
         there = fit(_held_inside(problem, k, value, solved.values))

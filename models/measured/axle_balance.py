@@ -14,30 +14,30 @@ from functools import cached_property
 import numpy as np
 
 from models.drift.growth import RigidPitch, rigid_pitch
-from models.measured.ratios import EMPTY, Wrong
+from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, WrongFactor
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.vehicles.pitch_plane import Parameters
 
-AXLES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
+FORCE_PLACES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
 """Where vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
 GRAVITY = 9.81
 """m/s^2, by which shares are told where a vehicle has another one, or none."""
-BLOCKS = 16
+BLOCKS_OF_RECORD = 16
 """Means over parts of the record: what is faster than a block says nothing of its slope."""
 NEGLIGIBLE_SHARE = 0.003
 """Share of the weight, or of the moment of an axle's load, below which nothing is said: the drift of 0.1 % is what
 studies of trust are about."""
-RISE, SWING = 0.5, 0.1
+STEADY_SPEED_GAIN, STEADY_RATE_GAIN = 0.5, 0.1
 """m/s and rad/s that a short record may gain steadily by its motion: entering a grade, or a bend of it."""
-SCATTER = 1.5
+BLOCK_SCATTER_FACTOR = 1.5
 """Rms of the block means about the slope, gained over the record: a wave as long as the record makes 1.7 of it, and is
 explained by the pitch that makes it."""
 FASTEST_SPEED = 60.0
 """m/s, speed of a vehicle on a grade."""
 STEEPEST_GRADE = 0.35
 """rad: no road is steeper (36 %)."""
-TURNS = 3
+PITCH_INTEGRATIONS = 3
 """Repeated integrations of the pitch, each with the arms of the one before."""
 LEAST_PITCH_SHARE = 0.05
 """Part of a pitch that does not rise steadily, at the least."""
@@ -48,8 +48,8 @@ class AxleForces:
     """forces (n, 2) : front and rear, N, up on the wheels, ``period`` (s) apart. signals : of either axle.
 
     duration : s, of the run that they drive. remedies : what to do about a wrong sign, unit or factor, None for those
-    of a channel map. rests : whether the run starts from the static equilibrium; turn : whether the forces turn with
-    the chassis.
+    of a channel map. starts_at_rest : whether the run starts from the static equilibrium; turn : whether the forces
+    turn with the chassis.
     """
 
     forces: np.ndarray
@@ -57,8 +57,8 @@ class AxleForces:
     parameters: Parameters
     signals: tuple[tuple[Signal, ...], tuple[Signal, ...]]
     duration: float
-    remedies: Mapping[Wrong, str] | None = None
-    rests: bool = True
+    remedies: Mapping[WrongFactor, str] | None = None
+    starts_at_rest: bool = True
     turn: bool = False
 
     @cached_property
@@ -80,10 +80,12 @@ class AxleForces:
     def empty(self) -> np.ndarray:
         """Which axles (2,) have a mean force that is negligible compared with their static load and with their
         variation."""
-        return (np.abs(self.means) < EMPTY * self.loads) & (np.abs(self.means) <= self.forces.std(axis=0))
+        return (np.abs(self.means) < NEGLIGIBLE_MEAN_SHARE * self.loads) & (
+            np.abs(self.means) <= self.forces.std(axis=0)
+        )
 
     @property
-    def lasted(self) -> float:
+    def last_sample_time(self) -> float:
         """Time (s) of the last sample."""
         return self.period * (len(self.forces) - 1)
 
@@ -93,10 +95,12 @@ class AxleForces:
         return tuple(s.name for axle in self.signals for s in axle)
 
     @cached_property
-    def arms(self) -> np.ndarray:
+    def accelerations_per_newton(self) -> np.ndarray:
         """Accelerations (2, 2) per 1 N at the front and at the rear axle: heave (upwards), then pitch (nose up)."""
         body = self.rigid
-        return np.array([[1 / body.mass, 1 / body.mass], [body.front / body.total, -body.rear / body.total]])
+        return np.array(
+            [[1 / body.mass, 1 / body.mass], [body.front_arm / body.total_inertia, -body.rear_arm / body.total_inertia]]
+        )
 
     @cached_property
     def pitch(self) -> tuple[np.ndarray, np.ndarray]:
@@ -106,14 +110,14 @@ class AxleForces:
         The lever arms of vertical forces shorten with the cosine of the pitch. A few iterations account for this while
         the pitch is small.
         """
-        moments = self.forces @ self.arms[1]
-        rate = self._summed(moments)
-        pitch = self._summed(rate)
-        for _ in range(0 if self.turn else TURNS):
+        moments = self.forces @ self.accelerations_per_newton[1]
+        rate = self._time_integral(moments)
+        pitch = self._time_integral(rate)
+        for _ in range(0 if self.turn else PITCH_INTEGRATIONS):
             if abs(pitch).max() > STEEPEST_GRADE:
                 break
-            rate = self._summed(moments * np.cos(pitch))
-            pitch = self._summed(rate)
+            rate = self._time_integral(moments * np.cos(pitch))
+            pitch = self._time_integral(rate)
         return rate, pitch
 
     @cached_property
@@ -121,16 +125,16 @@ class AxleForces:
         """Vertical speed (n,) of the centre of mass in m/s, upwards, from integrating the forces, starting at rest."""
         pitch = self.pitch[1]
         upright = np.cos(pitch) if self.turn and abs(pitch).max() < STEEPEST_GRADE else 1.0
-        return self._summed(self.forces @ self.arms[0] * upright - self.parameters.g)
+        return self._time_integral(self.forces @ self.accelerations_per_newton[0] * upright - self.parameters.g)
 
-    def _summed(self, values: np.ndarray) -> np.ndarray:
+    def _time_integral(self, values: np.ndarray) -> np.ndarray:
         """Time integral (n,) of samples (n,), starting at the first one."""
         return np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * self.period)))
 
 
 def axle_signals(recording: Recording, axle: str) -> list[Signal]:
     """Signals of the vertical force of an axle: its own signal, or those of both its wheels."""
-    vertical = [s for at in AXLES[axle] for s in recording.find("force", at, "z") if not s.check]
+    vertical = [s for at in FORCE_PLACES[axle] for s in recording.find("force", at, "z") if not s.check]
     whole = [signal for signal in vertical if signal.at == axle]
     return whole or vertical
 
@@ -138,12 +142,12 @@ def axle_signals(recording: Recording, axle: str) -> list[Signal]:
 def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
     """Vertical forces of both axles for the checks, short and long gaps bridged by straight lines; None where one axle
     lacks a wheel's signal."""
-    signals = tuple(tuple(axle_signals(recording, axle)) for axle in AXLES)
+    signals = tuple(tuple(axle_signals(recording, axle)) for axle in FORCE_PLACES)
     if not all(
-        side and len(side) == (1 if side[0].at == axle else 2) for axle, side in zip(AXLES, signals, strict=True)
+        side and len(side) == (1 if side[0].at == axle else 2) for axle, side in zip(FORCE_PLACES, signals, strict=True)
     ):
         return None
-    front, rear = (np.asarray(sum(_straight(recording.samples(s)) for s in side)) for side in signals)
+    front, rear = (np.asarray(sum(_bridged_samples(recording.samples(s)) for s in side)) for side in signals)
     turn = all(s.frame != "inertial" for side in signals for s in side)
     return AxleForces(
         np.column_stack([front, rear]),
@@ -155,14 +159,14 @@ def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
     )
 
 
-def _straight(values: np.ndarray) -> np.ndarray:
+def _bridged_samples(values: np.ndarray) -> np.ndarray:
     """Samples (n,) with straight lines across gaps; all 0 if nothing was measured."""
     known = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), known, values[known]) if len(known) else np.zeros(len(values))
 
 
 @dataclass(frozen=True)
-class Steady:
+class SteadyResidual:
     """Residual: steady accelerations (2,) that the vehicle's motion cannot explain, m/s^2 upwards and rad/s^2 nose up.
     known (2,) : their uncertainties; smaller accelerations mean nothing. units (2,) : accelerations by a whole load:
     gravity, and the pitch acceleration by one axle's load."""
@@ -172,45 +176,54 @@ class Steady:
     units: np.ndarray
 
     @property
-    def shares(self) -> np.ndarray:
+    def shares_of_load(self) -> np.ndarray:
         """Ratios (2,) of the unexplained accelerations to those that a whole load would cause."""
         return self.accelerations / self.units
 
     @property
-    def seen(self) -> np.ndarray:
+    def is_beyond_uncertainty(self) -> np.ndarray:
         """Which of the two steady accelerations (2,) is beyond its uncertainty."""
         return np.abs(self.accelerations) > self.known
 
 
-def equilibrium_residual(axles: AxleForces) -> Steady:
+def equilibrium_residual(axles: AxleForces) -> SteadyResidual:
     """Residual of the vertical and the pitch equilibrium over the whole record.
 
     Vertical motion is compared with two explanations: a level road, and a climb with the pitch that the forces give.
     The residual is that of the better explanation.
     """
     rate, pitch = axles.pitch
-    times = _blocks(axles.lasted * np.linspace(-0.5, 0.5, len(axles.forces)))
-    units = np.array([GRAVITY, axles.arms[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)])
-    level = _slope(times, _blocks(axles.rise))
-    climbing = _slope(times, _blocks(axles.rise), _blocks(pitch)) if abs(pitch).max() < STEEPEST_GRADE else level
+    times = _block_means(axles.last_sample_time * np.linspace(-0.5, 0.5, len(axles.forces)))
+    units = np.array(
+        [GRAVITY, axles.accelerations_per_newton[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)]
+    )
+    level = _slope_and_scatter(times, _block_means(axles.rise))
+    climbing = (
+        _slope_and_scatter(times, _block_means(axles.rise), _block_means(pitch))
+        if abs(pitch).max() < STEEPEST_GRADE
+        else level
+    )
     risen, turned = (
-        _slope_with_error(estimate, unit, gained, axles.lasted)
-        for estimate, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
+        _slope_with_error(estimate, unit, gained, axles.last_sample_time)
+        for estimate, unit, gained in (
+            (level, units[0], STEADY_SPEED_GAIN),
+            (_slope_and_scatter(times, _block_means(rate)), units[1], STEADY_RATE_GAIN),
+        )
     )
     risen = min(
         risen,
-        _slope_with_error(climbing, units[0], RISE, axles.lasted),
+        _slope_with_error(climbing, units[0], STEADY_SPEED_GAIN, axles.last_sample_time),
         key=lambda estimate: abs(estimate[0]) / estimate[1],
     )
-    return Steady(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
+    return SteadyResidual(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
 
 def _slope_with_error(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
     """A slope, and its uncertainty from the scatter of the values about the fitted line."""
-    return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + SCATTER * estimate[1]) / lasted
+    return estimate[0], NEGLIGIBLE_SHARE * unit + (gained + BLOCK_SCATTER_FACTOR * estimate[1]) / lasted
 
 
-def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
+def _slope_and_scatter(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
     """Least-squares slope of values (n,) over times (n,), and the scatter of the values about the line.
 
     What a vehicle climbs with its pitch (n,), at a speed between 0 and the fastest, is fitted beside it; the scatter
@@ -228,9 +241,9 @@ def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = Non
     return slope, float(np.sqrt(np.mean((values - slope * times) ** 2))) / unlike
 
 
-def _blocks(values: np.ndarray) -> np.ndarray:
+def _block_means(values: np.ndarray) -> np.ndarray:
     """Means of values (n, ...) over blocks of equal length along the first axis."""
-    parts = np.array_split(values, min(BLOCKS, max(len(values) // 2, 2)))
+    parts = np.array_split(values, min(BLOCKS_OF_RECORD, max(len(values) // 2, 2)))
     return np.array([part.mean(axis=0) for part in parts])
 
 

@@ -6,38 +6,38 @@ Both kinds of input go through here: a file of wheel forces of a pitch-plane sce
 import numpy as np
 
 from models.core.finding import Finding, Weight
-from models.core.time_series import sparse
+from models.core.time_series import sparse_record_warning
 from models.measured.axle_balance import (
     GRAVITY,
     NEGLIGIBLE_SHARE,
     STEEPEST_GRADE,
     AxleForces,
-    Steady,
+    SteadyResidual,
     equilibrium_residual,
 )
-from models.measured.ratios import Wrong, counted_from_load, sentence
+from models.measured.ratios import WrongFactor, cause_and_sentence, counted_from_load
 
-CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
+FINDING_NAMES = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")
 """Names of all findings, with those of the samples of a file."""
 LARGE_SHARE = 0.05
 """Share beyond which the forces are another vehicle's, or of another unit, if they move it far."""
-HEIGHT = 1.0
+LARGEST_HEIGHT = 1.0
 """m: a vehicle that leaves a level road further has no road under it."""
-IMPOSSIBLE = 1e6
+IMPOSSIBLE_WEIGHTS = 1e6
 """Weights of the vehicle that no wheel force is: a mark for no value, or a damaged file."""
 EXPLAINED_SHARE = 0.02
 """Share by which a mean may differ from what an explanation predicts."""
 START_LOAD_SHARE = 0.05
 """Share of its static load by which an axle may begin off it."""
-BAND = 1.0, 25.0
+COMMON_ROAD_BAND = 1.0, 25.0
 """Hz, between which both axles feel the same road one after the other."""
-LAG = 0.02, 2.0
+AXLE_LAG_RANGE = 0.02, 2.0
 """s, between the axles of a vehicle."""
 REPEATED_CORRELATION = 0.3
 """Correlation from which on one axle is said to repeat the other."""
-COPIED = 1e-3
+COPIED_SHARE = 1e-3
 """Rms of what is left of an axle's changes without the other's, by their own, up to which they are the same."""
-IN_FILE: dict[Wrong, str] = {
+IN_FILE: dict[WrongFactor, str] = {
     "sign": "forces up on the wheels are positive; turn its sign",
     "unit": "correct the unit in its header",
     "gain": "check its calibration factor",
@@ -49,25 +49,25 @@ IN_FILE: dict[Wrong, str] = {
 def check(axles: AxleForces) -> list[Finding]:
     """Findings on the axles' forces. If one finding explains a fault, no other finding names it."""
     largest = float(np.abs(axles.forces).max())
-    if largest > IMPOSSIBLE * axles.loads.sum():
+    if largest > IMPOSSIBLE_WEIGHTS * axles.loads.sum():
         text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
         return [_error(axles, "weight", text, largest, "N")]
-    for look in (_sparse, _explained, _wrong_means, _balance, _forces_begin_in_motion):
+    for look in (_sparse_finding, _common_mistake_findings, _wrong_means, _imbalance_findings, _forces_begin_in_motion):
         findings = look(axles)
         if findings:
             return findings + _constant_axle(axles)
-    return _constant_axle(axles) + _copied(axles) + _order(axles) or [_weights_agree(axles)]
+    return _constant_axle(axles) + _copied_finding(axles) + _order(axles) or [_weights_agree(axles)]
 
 
-def _sparse(axles: AxleForces) -> list[Finding]:
+def _sparse_finding(axles: AxleForces) -> list[Finding]:
     """Finding on a long record of which a run uses very little; its sampling is too coarse for wheel motion."""
-    text = sparse(len(axles.forces), axles.period, axles.duration)
+    text = sparse_record_warning(len(axles.forces), axles.period, axles.duration)
     if not text:
         return []
     return [Finding("times", "doubt", "wheel forces", text, axles.period, "s", axles.names)]
 
 
-def _explained(axles: AxleForces) -> list[Finding]:
+def _common_mistake_findings(axles: AxleForces) -> list[Finding]:
     """Findings on one common mistake that explains the imbalance at both axles to within a few per cent."""
     p = axles.parameters
     if p.g == 0:
@@ -95,17 +95,17 @@ def _explained(axles: AxleForces) -> list[Finding]:
             "they are of one wheel of each axle. Add those of the other."
         )
         return [_error(axles, "weight", text, -50.0, "%")]
-    return _exchanged(axles)
+    return _exchanged_finding(axles)
 
 
 def _is_near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
     return bool((np.abs(values - wanted) < EXPLAINED_SHARE * scale / 2).all())
 
 
-def _exchanged(axles: AxleForces) -> list[Finding]:
+def _exchanged_finding(axles: AxleForces) -> list[Finding]:
     """Finding that the two axles' forces fit the static loads only if they are exchanged."""
     as_is, crossed = (np.abs(each / axles.loads - 1).max() for each in (axles.means, axles.means[::-1]))
-    if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).seen[1]:
+    if crossed > EXPLAINED_SHARE or as_is < 3 * crossed or not equilibrium_residual(axles).is_beyond_uncertainty[1]:
         return []
     text = (
         f"Front and rear are exchanged: {axles.means[0]:.5g} N in front and {axles.means[1]:.5g} N at the rear on "
@@ -122,21 +122,23 @@ def _wrong_means(axles: AxleForces) -> list[Finding]:
     for axle, mean, load in zip(axles.signals, axles.means, axles.loads if axles.parameters.g else (), strict=False):
         for_axle = f"the {load:.5g} N that rest on it on average"
         ratio, names = float(mean / load), tuple(s.name for s in axle)
-        kind, text = sentence(ratio, axle[0], for_axle, axles.remedies)
+        kind, text = cause_and_sentence(ratio, axle[0], for_axle, axles.remedies)
         if kind in ("sign", "unit") or (kind == "size" and far):
             check = "weight" if kind == "size" else kind
             findings.append(Finding(check, "error", axle[0].at, text, ratio, "1", names))
     return findings
 
 
-def _balance(axles: AxleForces) -> list[Finding]:
+def _imbalance_findings(axles: AxleForces) -> list[Finding]:
     """Findings on accelerations that a vehicle cannot sustain: steady heave, and steady pitch."""
     motion = equilibrium_residual(axles)
-    if not motion.seen.any():
+    if not motion.is_beyond_uncertainty.any():
         return []
-    beyond = np.abs(motion.shares) > LARGE_SHARE + motion.known / motion.units
+    beyond = np.abs(motion.shares_of_load) > LARGE_SHARE + motion.known / motion.units
     weight: Weight = "error" if (beyond & _travels_too_far(axles, motion)).any() else "doubt"
-    excess = np.linalg.solve(axles.arms, np.where(motion.seen, motion.accelerations, 0.0))
+    excess = np.linalg.solve(
+        axles.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
+    )
     share = excess / axles.loads
     told = " and ".join(
         _excess_text(*each)
@@ -144,30 +146,36 @@ def _balance(axles: AxleForces) -> list[Finding]:
         if abs(each[2]) > NEGLIGIBLE_SHARE / 2
     )
     text = (
-        f"On average {told} against what rests there: {_motion(axles, motion)}. Check calibration, zero and the "
+        f"On average {told} against what rests there: {_motion_text(axles, motion)}. Check calibration, zero and the "
         "vehicle's masses and a, b; a vehicle that brakes or accelerates has forces along the road, too, which "
         "this model has not."
     )
-    kind = "balance" if motion.seen[1] else "weight"
-    size = float(motion.shares[1] if motion.seen[1] else motion.shares[0])
+    kind = "balance" if motion.is_beyond_uncertainty[1] else "weight"
+    size = float(motion.shares_of_load[1] if motion.is_beyond_uncertainty[1] else motion.shares_of_load[0])
     return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", axles.names)]
 
 
-def _travels_too_far(axles: AxleForces, motion: Steady) -> np.ndarray:
+def _travels_too_far(axles: AxleForces, motion: SteadyResidual) -> np.ndarray:
     """Which of the two steady accelerations (2,), heave and pitch, moves the vehicle farther during the run than a road
     does."""
-    return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEPEST_GRADE])
+    return motion.is_beyond_uncertainty & (
+        np.abs(motion.accelerations) * axles.duration**2 / 2 > [LARGEST_HEIGHT, STEEPEST_GRADE]
+    )
 
 
 def _excess_text(name: str, excess: float, share: float) -> str:
     return f"{name} carries {abs(excess):.4g} N ({abs(share):.2%}) too {'much' if excess > 0 else 'little'}"
 
 
-def _motion(axles: AxleForces, motion: Steady) -> str:
+def _motion_text(axles: AxleForces, motion: SteadyResidual) -> str:
     """Text on how far the steady accelerations move the vehicle during the run."""
     risen, turned = motion.accelerations * axles.duration**2 / 2
-    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.seen[0] else []
-    parts += [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"] if motion.seen[1] else []
+    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.is_beyond_uncertainty[0] else []
+    parts += (
+        [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"]
+        if motion.is_beyond_uncertainty[1]
+        else []
+    )
     return f"a vehicle free to move {' and '.join(parts)} in {axles.duration:g} s"
 
 
@@ -176,7 +184,7 @@ def _forces_begin_in_motion(axles: AxleForces) -> list[Finding]:
     first = axles.forces[0] / axles.loads - 1
     last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
     if (
-        not axles.rests
+        not axles.starts_at_rest
         or axles.parameters.g == 0
         or np.abs(first).max() < START_LOAD_SHARE
         or abs(last) < max(STEEPEST_GRADE, _noise(axles))
@@ -198,7 +206,7 @@ def _noise(axles: AxleForces) -> float:
     signals.
     """
     rough = float(np.diff(axles.forces, 3, axis=0).std()) / 20**0.5
-    return 4 * (axles.rigid.intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
+    return 4 * (axles.rigid.noise_intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
 def _constant_axle(axles: AxleForces) -> list[Finding]:
@@ -211,11 +219,11 @@ def _constant_axle(axles: AxleForces) -> list[Finding]:
     return [Finding("balance", "doubt", axle.at, text, 0.0, "N", (axle.name,))]
 
 
-def _copied(axles: AxleForces) -> list[Finding]:
+def _copied_finding(axles: AxleForces) -> list[Finding]:
     """Finding on an axle whose samples equal the other axle's, times a factor."""
     off = axles.forces - axles.means
     size = np.sqrt(np.mean(off**2, axis=0))
-    if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED:
+    if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED_SHARE:
         return []
     text = (
         f"The rear axle's force changes as the front axle's does, times {size[1] / size[0]:.4g}, in every sample: one "
@@ -226,7 +234,7 @@ def _copied(axles: AxleForces) -> list[Finding]:
 
 def _order(axles: AxleForces) -> list[Finding]:
     """Finding on axles that meet the road's unevenness in the wrong order."""
-    late, alike, other = _delay(axles)
+    late, alike, other = _axle_delay(axles)
     if alike < REPEATED_CORRELATION or late > 0 or alike < 1.5 * other:
         return []
     text = (
@@ -236,15 +244,15 @@ def _order(axles: AxleForces) -> list[Finding]:
     return [Finding("swapped", "doubt", "wheel forces", text, late, "s", axles.names)]
 
 
-def _delay(axles: AxleForces) -> tuple[float, float, float]:
+def _axle_delay(axles: AxleForces) -> tuple[float, float, float]:
     """Time (s) by which the rear axle's force repeats the front one's, the correlation at that delay, and the best
     correlation with opposite sign; 0 if the forces do not show any of this."""
     n = len(axles.forces)
     frequencies = np.fft.rfftfreq(2 * n, axles.period)
-    band = (frequencies > BAND[0]) & (frequencies < BAND[1])
+    band = (frequencies > COMMON_ROAD_BAND[0]) & (frequencies < COMMON_ROAD_BAND[1])
     spectra = np.fft.rfft(axles.forces - axles.means, 2 * n, axis=0) * band[:, None]
     power = np.sqrt(np.prod((np.abs(spectra) ** 2).sum(axis=0)))
-    low, high = (round(lag / axles.period) for lag in LAG)
+    low, high = (round(lag / axles.period) for lag in AXLE_LAG_RANGE)
     if not power > 0 or n < 2 * high:
         return 0.0, 0.0, 0.0
     alike = np.fft.irfft(spectra[:, 0].conj() * spectra[:, 1]) * n / power
@@ -255,12 +263,12 @@ def _delay(axles: AxleForces) -> tuple[float, float, float]:
     return sign * (low + int(best.argmax())) * axles.period, float(best.max()), float(other.max())
 
 
-def unchecked(axles: AxleForces) -> str:
+def unchecked_delay_sentence(axles: AxleForces) -> str:
     """Sentence on why these forces alone do not show the delay between the axles, and what would show it; "" for
     constant forces."""
     if not np.ptp(axles.forces, axis=0).any():
         return ""
-    late, alike, _ = _delay(axles)
+    late, alike, _ = _axle_delay(axles)
     seen = ""
     if late > 0 and alike >= REPEATED_CORRELATION:
         speed = (axles.parameters.a + axles.parameters.b) / late
@@ -272,11 +280,11 @@ def unchecked(axles: AxleForces) -> str:
 def _weights_agree(axles: AxleForces) -> Finding:
     motion = equilibrium_residual(axles)
     text = (
-        f"The mean wheel forces carry the vehicle to {motion.shares[0]:+.2%} of its weight; an error of "
+        f"The mean wheel forces carry the vehicle to {motion.shares_of_load[0]:+.2%} of its weight; an error of "
         f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-        f"{100 * abs(motion.known[1] / (axles.arms[1] * axles.loads)).max():.2g} %."
+        f"{100 * abs(motion.known[1] / (axles.accelerations_per_newton[1] * axles.loads)).max():.2g} %."
     )
-    return Finding("weight", "note", "", text, 100 * float(motion.shares[0]), "%", axles.names)
+    return Finding("weight", "note", "", text, 100 * float(motion.shares_of_load[0]), "%", axles.names)
 
 
 def _error(axles: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:

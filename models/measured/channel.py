@@ -11,7 +11,7 @@ import numpy as np
 
 from models.core.finding import Finding
 
-BLOCK = 60_000
+SAMPLES_PER_BLOCK = 60_000
 """Samples of a block: a minute at 1 kHz."""
 
 
@@ -65,7 +65,7 @@ class Source(Protocol):
     def noticed(self) -> tuple[Finding, ...]:
         """Findings on opening the file: cut off, repeated names, channels left out, how numbers are written."""
 
-    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[SampleBlock]:
+    def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of at most ``length`` samples of channels of one group, from sample ``first`` on.
 
         Raises InputError that names the file and the byte, line or sample where it cannot be read.

@@ -14,7 +14,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
 
-ITEM = np.dtype("<f8")
+SAMPLE_TYPE = np.dtype("<f8")
 
 
 class Readable(ABC):
@@ -45,7 +45,7 @@ class Columns(Readable):
             self.done = int(journal["done"])
         else:
             with path.open("wb") as file:
-                file.truncate(len(names) * count * ITEM.itemsize)
+                file.truncate(len(names) * count * SAMPLE_TYPE.itemsize)
             self.close(0)
 
     def close(self, completed: int) -> None:
@@ -57,8 +57,8 @@ class Columns(Readable):
     def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:
         """Store samples (n, names) of some signals from sample ``first`` on, without recording them as complete."""
         with self.path.open("r+b") as file:
-            for name, column in zip(names, np.asarray(values, ITEM).T, strict=True):
-                file.seek((self.names.index(name) * self.count + first) * ITEM.itemsize)
+            for name, column in zip(names, np.asarray(values, SAMPLE_TYPE).T, strict=True):
+                file.seek((self.names.index(name) * self.count + first) * SAMPLE_TYPE.itemsize)
                 file.write(np.ascontiguousarray(column).tobytes())
             file.flush()
             os.fsync(file.fileno())
@@ -72,8 +72,8 @@ class Columns(Readable):
     def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
         """Samples (n,) of one signal."""
         n = self.count - first if count is None else min(count, self.count - first)
-        offset = (self.names.index(name) * self.count + first) * ITEM.itemsize
-        return np.fromfile(self.path, ITEM, n, offset=offset)
+        offset = (self.names.index(name) * self.count + first) * SAMPLE_TYPE.itemsize
+        return np.fromfile(self.path, SAMPLE_TYPE, n, offset=offset)
 
     def remove(self) -> None:
         """Delete the file and its journal."""

@@ -4,11 +4,11 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.measured.channel import Source
-from models.measured.timing import timing
+from models.measured.timing import sample_timing
 from models.measured.units import factor_between
 
 
-def curve(source: Source, name: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
+def channel_curve(source: Source, name: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) in s, strictly ascending, and values (n,) of a channel in ``unit``, NaN where nothing was measured.
 
     Raises InputError where the file has no such channel, for a unit that is missing or does not fit, and for times
@@ -23,5 +23,5 @@ def curve(source: Source, name: str, unit: str) -> tuple[np.ndarray, np.ndarray]
     factor = factor_between(channel.unit, unit, source.path, name)
     blocks = list(source.blocks([name]))
     times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
-    clock = timing(times, str(source.path), (name,))
+    clock = sample_timing(times, str(source.path), (name,))
     return clock.times, factor * (values if clock.order is None else values[clock.order])

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.curve import curve
+from models.measured.curve import channel_curve
 from models.measured.formats import open_source
 from models.measured.outliers import without_outliers
 
-CHANNELS = {"steer": "rad", "speed": "m/s"}
+DRIVE_CHANNELS = {"steer": "rad", "speed": "m/s"}
 LEAST_SPEED = 2.0
 """m/s: slip angles are ratios to the speed."""
 FEWEST_SAMPLES = 16
@@ -37,7 +37,7 @@ def read_drive(path: Path, stretch: tuple[float, ...] = ()) -> MeasuredDrive:
 @lru_cache(maxsize=8)
 def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredDrive:
     source = open_source(path)
-    read = {name: curve(source, name, unit) for name, unit in CHANNELS.items()}
+    read = {name: channel_curve(source, name, unit) for name, unit in DRIVE_CHANNELS.items()}
     first = max(times[0] for times, _ in read.values())
     last = min(times[-1] for times, _ in read.values())
     begin, end = stretch or (first, last)
@@ -50,7 +50,7 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
         raise InputError(path, "rows", len(grid), f"a drive needs at least {FEWEST_SAMPLES} samples")
     values, left_out = dict[str, np.ndarray](), dict[str, int]()
     for name, (times, raw) in read.items():
-        values[name], left_out[name] = bridged(times, raw, grid, f"{path}, {name}")
+        values[name], left_out[name] = on_even_grid(times, raw, grid, f"{path}, {name}")
     slow = int(values["speed"].argmin())
     if values["speed"][slow] < LEAST_SPEED:
         allowed = f"at {grid[slow]:g} s: a drive needs at least {LEAST_SPEED:g} m/s, forward, throughout"
@@ -58,7 +58,7 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
     return MeasuredDrive(grid, values["steer"], values["speed"], left_out)
 
 
-def bridged(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
+def on_even_grid(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
     """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left out
     for that."""
     kept = without_outliers(values)

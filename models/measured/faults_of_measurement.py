@@ -11,14 +11,14 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field
 
-from models.core.errors import InputError, suggestion
-from models.core.noise import DROPOUTS, TRANSDUCERS, normal
+from models.core.errors import InputError, suggestion_phrase
+from models.core.noise import DROPOUTS, TRANSDUCERS, normal_samples
 from models.core.strict import Strict, quantity
 from models.measured.signal import Signal
 
 Amounts = dict[str, float]
 """Name of a channel, a transducer or a quantity -> amount in SI."""
-AMOUNTS = ("gain", "bias", "delay", "noise")
+FAULT_AMOUNTS = ("gain", "bias", "delay", "noise")
 FULL_SCALE_RATIO = 1.25
 """Full scale of a quantised channel by its largest value: an amplifier is not driven to its end."""
 
@@ -49,22 +49,22 @@ class Faults(Strict):
     dropouts: Dropouts | None = Field(default=None, description="gaps, all channels of a transducer at once")
 
 
-def amount(amounts: Amounts, signal: Signal) -> float:
+def amount_of_fault(amounts: Amounts, signal: Signal) -> float:
     """Amount of a fault for a signal in a scene: the value for its channel, else for its transducer, else for its
     quantity, else 0."""
-    return next((amounts[name] for name in _names(signal) if name in amounts), 0.0)
+    return next((amounts[name] for name in _names_of_signal(signal) if name in amounts), 0.0)
 
 
 def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
     """Raise InputError for a name that no signal has, a negative noise or a delay out of reach."""
-    known = tuple(dict.fromkeys(name for signal in signals for name in _names(signal)))
-    amounts, lists = {kind: getattr(faults, kind) for kind in AMOUNTS}, (faults.quantisation, faults.dropouts)
+    known = tuple(dict.fromkeys(name for signal in signals for name in _names_of_signal(signal)))
+    amounts, lists = {kind: getattr(faults, kind) for kind in FAULT_AMOUNTS}, (faults.quantisation, faults.dropouts)
     named = [(kind, name) for kind, listed in amounts.items() for name in listed]
     for kind, listed in zip(("quantisation", "dropouts"), lists, strict=True):
         named += [(f"{kind}.channels", name) for name in listed.channels] if listed else []
     for kind, name in named:
         if name not in known:
-            wrong = f"no such channel, transducer or quantity{suggestion(name, known)}"
+            wrong = f"no such channel, transducer or quantity{suggestion_phrase(name, known)}"
             raise InputError(file, f"{place}.{kind}", name, wrong)
     for kind in ("noise", "delay"):
         for name, value in amounts[kind].items():
@@ -72,7 +72,7 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
                 raise InputError(file, f"{place}.{kind}.{name}", value, "must be 0 or more")
 
 
-def measured(
+def measured_samples(
     faults: Faults, signals: tuple[Signal, ...], truth: np.ndarray, step: float, stride: int, seed: int, path: int = 0
 ) -> np.ndarray:
     """Measured samples (m, signals): every ``stride``-th row of the true values (n, signals), ``step`` (s) apart, with
@@ -83,20 +83,22 @@ def measured(
     period = step * stride
     columns = []
     for signal, true in zip(signals, truth.T, strict=True):
-        late = amount(faults.delay, signal)
-        values = (1.0 + amount(faults.gain, signal)) * _delayed_samples(true, step, stride, late) + amount(
-            faults.bias, signal
+        late = amount_of_fault(faults.delay, signal)
+        values = (1.0 + amount_of_fault(faults.gain, signal)) * _delayed_samples(
+            true, step, stride, late
+        ) + amount_of_fault(faults.bias, signal)
+        values = values + amount_of_fault(faults.noise, signal) * _random_stream(
+            signal.channel, seed, path, len(values), TRANSDUCERS
         )
-        values = values + amount(faults.noise, signal) * _stream(signal.channel, seed, path, len(values), TRANSDUCERS)
         if faults.quantisation and _is_named(faults.quantisation.channels, signal):
-            values = quantised(values, faults.quantisation.bits)
+            values = quantised_values(values, faults.quantisation.bits)
         if faults.dropouts and _is_named(faults.dropouts.channels, signal):
-            values[silent(faults.dropouts, signal.at, seed, path, len(values), period)] = np.nan
+            values[lost_samples(faults.dropouts, signal.at, seed, path, len(values), period)] = np.nan
         columns.append(values)
     return np.column_stack(columns)
 
 
-def quantised(values: np.ndarray, bits: int) -> np.ndarray:
+def quantised_values(values: np.ndarray, bits: int) -> np.ndarray:
     """Values (n,) rounded to the steps of a converter with so many bits, whose range is a little larger than the
     largest value."""
     largest = float(np.abs(values).max())
@@ -106,11 +108,11 @@ def quantised(values: np.ndarray, bits: int) -> np.ndarray:
     return each * np.rint(values / each)
 
 
-def silent(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
+def lost_samples(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
     """Whether each of ``count`` samples of a transducer is lost (count,); the first and the last one never are."""
     from scipy.stats import norm
 
-    begins = _stream(at, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
+    begins = _random_stream(at, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
     length = max(round(dropouts.length / period), 1)
     lost = np.convolve(begins, np.ones(length))[:count] > 0.5
     lost[[0, -1]] = False
@@ -127,14 +129,14 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
     return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(at))
 
 
-def _stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
+def _random_stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:
     """Normal random samples (count,) that depend only on seed, path, source and the name."""
-    return normal(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
+    return normal_samples(seed, (path << 32) + crc32(name.encode()), count, 1, source=source)[:, 0]
 
 
-def _names(signal: Signal) -> tuple[str, ...]:
+def _names_of_signal(signal: Signal) -> tuple[str, ...]:
     return signal.channel, signal.at, signal.quantity
 
 
 def _is_named(names: list[str], signal: Signal) -> bool:
-    return not names or not set(names).isdisjoint(_names(signal))
+    return not names or not set(names).isdisjoint(_names_of_signal(signal))

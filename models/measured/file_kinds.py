@@ -7,7 +7,7 @@ from pathlib import Path
 
 from models.core.errors import InputError
 
-EXTENSIONS = {
+FORMAT_OF_EXTENSION = {
     ".csv": "CSV",
     ".txt": "CSV",
     ".tsv": "CSV",
@@ -21,23 +21,23 @@ EXTENSIONS = {
     ".tdms": "TDMS",
 }
 """Extension of a file that can be read -> its usual format."""
-READABLE = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
+FORMAT_OF_FIRST_BYTES = {b"MDF ": "ASAM MDF", b"UnFinMF": "ASAM MDF", b"TDSm": "TDMS", b"FORMAT\0": "RPC III"}
 """First bytes of a file that can be read -> its format; any other text is read as CSV."""
 KNOWN_FORMATS = "CSV, ASAM MDF (.mf4), MTS RPC III (.rsp) and TDMS can be read"
 AS_CSV = "save its channels as CSV with a column time [s]"
-BEGINS = {
+DESCRIPTION_OF_FORMAT = {
     "ASAM MDF": "ASAM MDF, which begins with MDF",
     "TDMS": "TDMS, which begins with TDSm",
     "RPC III": "MTS RPC III (response .rsp, drive .drv, time history .tim), which begins with FORMAT",
 }
 """Format -> what it is called and how it begins."""
 WRITE_ANEW = f"write it anew from the software that has it, or {AS_CSV}"
-DECODE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
-UNPACK = "unpack it, and name the file inside"
+DECODE_ADVICE = "decode its messages with their database (.dbc) into MDF 4, with asammdf or the logger's software"
+UNPACK_ADVICE = "unpack it, and name the file inside"
 
 
 @dataclass(frozen=True)
-class Kind:
+class UnreadableKind:
     """A kind of file that cannot be read here: its description, advice to the user, pattern of its first bytes,
     extensions."""
 
@@ -47,90 +47,101 @@ class Kind:
     extensions: tuple[str, ...] = ()
 
 
-KINDS = (
-    Kind("an Excel or OpenDocument workbook", "save the sheet as CSV UTF-8", rb"(?!)", (".xlsx", ".xlsm", ".ods")),
-    Kind("an Excel workbook of 1997 to 2003", "save the sheet as CSV UTF-8", rb"\xd0\xcf\x11\xe0", (".xls",)),
-    Kind("text in UTF-32", "save it as UTF-8", rb"\xff\xfe\0\0|\0\0\xfe\xff"),
-    Kind(
+UNREADABLE_KINDS = (
+    UnreadableKind(
+        "an Excel or OpenDocument workbook", "save the sheet as CSV UTF-8", rb"(?!)", (".xlsx", ".xlsm", ".ods")
+    ),
+    UnreadableKind("an Excel workbook of 1997 to 2003", "save the sheet as CSV UTF-8", rb"\xd0\xcf\x11\xe0", (".xls",)),
+    UnreadableKind("text in UTF-32", "save it as UTF-8", rb"\xff\xfe\0\0|\0\0\xfe\xff"),
+    UnreadableKind(
         "a MATLAB file",
         "write its channels as CSV with a column time [s]: writetable in MATLAB, scipy.io.loadmat in Python",
         rb"MATLAB",
         (".mat",),
     ),
-    Kind(
+    UnreadableKind(
         "HDF5",
         "write its channels as CSV with a column time [s], or as MDF 4: h5py in Python opens it",
         rb"\x89HDF",
         (".h5", ".hdf5", ".hdf"),
     ),
-    Kind(
+    UnreadableKind(
         "Parquet",
         "write it as CSV with a column time [s]: pandas.read_parquet(...).to_csv(...) in Python",
         rb"PAR1",
         (".parquet",),
     ),
-    Kind(
+    UnreadableKind(
         "Arrow or Feather",
         "write it as CSV with a column time [s]: pandas.read_feather(...).to_csv(...) in Python",
         rb"ARROW1",
         (".feather", ".arrow"),
     ),
-    Kind("a trace of bus messages (Vector BLF)", DECODE, rb"LOGG", (".blf",)),
-    Kind(
+    UnreadableKind("a trace of bus messages (Vector BLF)", DECODE_ADVICE, rb"LOGG", (".blf",)),
+    UnreadableKind(
         "a trace of bus messages (Vector ASC)",
-        DECODE,
+        DECODE_ADVICE,
         rb"(?i)(date [^\n]*\n\s*base (hex|dec)|base (hex|dec) )",
         (".asc",),
     ),
-    Kind("a trace of bus messages (PEAK)", DECODE, rb";\$FILEVERSION", (".trc",)),
-    Kind("a trace of bus messages (candump)", DECODE, rb"\s*\(\d+\.\d+\)\s+\w+\s", ()),
-    Kind(
+    UnreadableKind("a trace of bus messages (PEAK)", DECODE_ADVICE, rb";\$FILEVERSION", (".trc",)),
+    UnreadableKind("a trace of bus messages (candump)", DECODE_ADVICE, rb"\s*\(\d+\.\d+\)\s+\w+\s", ()),
+    UnreadableKind(
         "the header of a DIAdem data set, whose samples are in other files",
         "export the data set as TDMS",
         rb"(?i)(DIAEXTENDED|DIADEM|#BEGINGLOBALHEADER)",
         (),
     ),
-    Kind(
+    UnreadableKind(
         "the header of a DIAdem or ASAM ODS data set, whose samples are in another file",
         "export the data set as TDMS or MDF 4",
         rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<(usi:tdm|atfx)",
         (".tdm", ".tdx", ".atfx"),
     ),
-    Kind("the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)),
-    Kind("a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)),
-    Kind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
-    Kind("imc FAMOS", "export it as MDF 4 or CSV from the software that wrote it", rb"\|CF,", (".raw",)),
-    Kind("a Dewesoft file", "export it as MDF 4 or CSV from Dewesoft", rb"(?!)", (".dxd", ".d7d")),
-    Kind("an nCode time series", "export it as RPC III or CSV", rb"(?!)", (".s3t", ".dac")),
-    Kind("a CarMaker result file", "export it as MDF 4 or CSV", rb"(?!)", (".erg",)),
-    Kind("a numpy array", AS_CSV, rb"\x93NUMPY", (".npy", ".npz")),
-    Kind("packed by gzip", UNPACK, rb"\x1f\x8b", (".gz", ".tgz")),
-    Kind("packed by bzip2", UNPACK, rb"BZh", (".bz2",)),
-    Kind("packed by xz", UNPACK, rb"\xfd7zXZ", (".xz",)),
-    Kind("packed by zstd", UNPACK, rb"\x28\xb5\x2f\xfd", (".zst",)),
-    Kind("a 7-Zip archive", UNPACK, rb"7z\xbc\xaf", (".7z",)),
-    Kind("a RAR archive", UNPACK, rb"Rar!", (".rar",)),
-    Kind("a zip archive", UNPACK, rb"PK\x03\x04|PK\x05\x06", (".zip",)),
-    Kind("a web page", AS_CSV, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
-    Kind("XML", AS_CSV, rb"<\?xml", (".xml",)),
-    Kind("JSON", AS_CSV, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
-    Kind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
-    Kind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
-    Kind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
+    UnreadableKind(
+        "the index of a TDMS file", "name the .tdms file beside it, which has the data", rb"TDSh", (".tdms_index",)
+    ),
+    UnreadableKind(
+        "a LabVIEW measurement file", f"write TDMS in LabVIEW, or {AS_CSV}", rb"LabVIEW Measurement", (".lvm",)
+    ),
+    UnreadableKind("a universal file of modal analysis", AS_CSV, rb"\s{1,4}-1\s", (".unv", ".uff")),
+    UnreadableKind("imc FAMOS", "export it as MDF 4 or CSV from the software that wrote it", rb"\|CF,", (".raw",)),
+    UnreadableKind("a Dewesoft file", "export it as MDF 4 or CSV from Dewesoft", rb"(?!)", (".dxd", ".d7d")),
+    UnreadableKind("an nCode time series", "export it as RPC III or CSV", rb"(?!)", (".s3t", ".dac")),
+    UnreadableKind("a CarMaker result file", "export it as MDF 4 or CSV", rb"(?!)", (".erg",)),
+    UnreadableKind("a numpy array", AS_CSV, rb"\x93NUMPY", (".npy", ".npz")),
+    UnreadableKind("packed by gzip", UNPACK_ADVICE, rb"\x1f\x8b", (".gz", ".tgz")),
+    UnreadableKind("packed by bzip2", UNPACK_ADVICE, rb"BZh", (".bz2",)),
+    UnreadableKind("packed by xz", UNPACK_ADVICE, rb"\xfd7zXZ", (".xz",)),
+    UnreadableKind("packed by zstd", UNPACK_ADVICE, rb"\x28\xb5\x2f\xfd", (".zst",)),
+    UnreadableKind("a 7-Zip archive", UNPACK_ADVICE, rb"7z\xbc\xaf", (".7z",)),
+    UnreadableKind("a RAR archive", UNPACK_ADVICE, rb"Rar!", (".rar",)),
+    UnreadableKind("a zip archive", UNPACK_ADVICE, rb"PK\x03\x04|PK\x05\x06", (".zip",)),
+    UnreadableKind("a web page", AS_CSV, rb"(?i)\s*<(!doctype )?html", (".html", ".htm")),
+    UnreadableKind("XML", AS_CSV, rb"<\?xml", (".xml",)),
+    UnreadableKind("JSON", AS_CSV, rb"\s*[\[{]\s*[\[{\"]", (".json",)),
+    UnreadableKind("a PDF", AS_CSV, rb"%PDF", (".pdf",)),
+    UnreadableKind("sound", AS_CSV, rb"RIFF....WAVE", (".wav",)),
+    UnreadableKind("an SQLite database", AS_CSV, rb"SQLite format 3", (".db", ".sqlite")),
 )
 """What measurements come as, beside the formats that can be read; the first that fits is the one."""
-WORKBOOK, ARRAYS = KINDS[0], next(kind for kind in KINDS if ".npz" in kind.extensions)
+WORKBOOK_KIND, ARRAYS_KIND = UNREADABLE_KINDS[0], next(kind for kind in UNREADABLE_KINDS if ".npz" in kind.extensions)
 
 
 def format_of(path: Path, first_bytes: bytes) -> str:
     """Format of a file, from its first bytes; raises InputError with the kind of an unreadable file and advice."""
-    form = next((form for magic, form in READABLE.items() if first_bytes.startswith(magic)), "")
+    form = next((form for magic, form in FORMAT_OF_FIRST_BYTES.items() if first_bytes.startswith(magic)), "")
     if form:
         return form
     if first_bytes[:32].split(b"\0")[0].strip() == b"FORMAT":
         return "RPC III"
     kind = next(
-        (kind for kind in KINDS if re.match(kind.begins, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)), None
+        (
+            kind
+            for kind in UNREADABLE_KINDS
+            if re.match(kind.begins, first_bytes.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)
+        ),
+        None,
     )
     if kind is not None:
         if kind.extensions == (".zip",):
@@ -150,18 +161,18 @@ def is_text(first_bytes: bytes) -> bool:
 def usual_of(suffix: str, format_name: str) -> str:
     """Text on what files with an extension usually are; ``format_name``, this file's own format, for an unknown
     extension or .asc."""
-    if suffix in EXTENSIONS or suffix == ".asc":
-        return EXTENSIONS.get(suffix, format_name)
-    return next((kind.name for kind in KINDS if suffix in kind.extensions), format_name)
+    if suffix in FORMAT_OF_EXTENSION or suffix == ".asc":
+        return FORMAT_OF_EXTENSION.get(suffix, format_name)
+    return next((kind.name for kind in UNREADABLE_KINDS if suffix in kind.extensions), format_name)
 
 
 def by_extension(path: Path) -> str:
     """Phrase on what files with this extension usually are; empty if the extension is unknown."""
     suffix = path.suffix.lower()
-    kind = next((kind for kind in KINDS if suffix in kind.extensions), None)
+    kind = next((kind for kind in UNREADABLE_KINDS if suffix in kind.extensions), None)
     if kind is not None:
         return f", and its extension {path.suffix} is that of {kind.name}: {kind.remedy}"
-    usual = BEGINS.get(EXTENSIONS.get(suffix, ""), "")
+    usual = DESCRIPTION_OF_FORMAT.get(FORMAT_OF_EXTENSION.get(suffix, ""), "")
     return (
         usual and f", and its extension {path.suffix} is that of {usual}: it is damaged or something else; {WRITE_ANEW}"
     )
@@ -169,7 +180,7 @@ def by_extension(path: Path) -> str:
 
 def is_measurement(path: Path) -> bool:
     """Whether a file may be a measurement: its extension is one of measurement files, or it is no text."""
-    if path.suffix.lower() in (*EXTENSIONS, *(each for kind in KINDS for each in kind.extensions)):
+    if path.suffix.lower() in (*FORMAT_OF_EXTENSION, *(each for kind in UNREADABLE_KINDS for each in kind.extensions)):
         return True
     if path.suffix.lower() in ("", ".toml") or not path.is_file():
         return False
@@ -177,13 +188,13 @@ def is_measurement(path: Path) -> bool:
         return not is_text(file.read(256))
 
 
-def _of_archive(path: Path) -> Kind | None:
+def _of_archive(path: Path) -> UnreadableKind | None:
     """Kind of data in a zip archive: a spreadsheet workbook or numpy arrays."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError, ValueError):
-        return WORKBOOK if path.suffix.lower() in WORKBOOK.extensions else None
+        return WORKBOOK_KIND if path.suffix.lower() in WORKBOOK_KIND.extensions else None
     if any(name.startswith("xl/") or name == "content.xml" for name in names):
-        return WORKBOOK
-    return ARRAYS if names and all(name.endswith(".npy") for name in names) else None
+        return WORKBOOK_KIND
+    return ARRAYS_KIND if names and all(name.endswith(".npy") for name in names) else None

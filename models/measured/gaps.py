@@ -16,15 +16,15 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.recording import Recording
-from models.measured.signal import UNITS, Quantity, Signal
+from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
 
-BRIDGED = 0.1
+LONGEST_BRIDGED_GAP = 0.1
 """s: the longest gap in a hub force that is bridged."""
-SPAN = 0.3
+NEIGHBOUR_SPAN = 0.3
 """s of neighbours on either side that the filling is drawn from: several waves of wheel hop and the chassis' roll."""
 MOST_NEIGHBOURS = 200
 """Neighbours, about: those close to the gap all count, those farther away every so many."""
-LIMITS: dict[Quantity, float] = {
+LARGEST_PLAUSIBLE: dict[Quantity, float] = {
     "force": 1e6,
     "moment": 1e6,
     "acceleration": 1e4,
@@ -37,18 +37,20 @@ LIMITS: dict[Quantity, float] = {
 FAR_RATIO = 1000.0
 """Times the departure from the median that half of all samples do not exceed. A wrong unit makes all samples large
 alike, and is the business of the checks of weight and motion."""
-MARK = 1e30
+MISSING_VALUE_MARK = 1e30
 """What is beyond this is a mark, however many samples have it."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A gap: samples from ``first`` to before ``end``. ``doubt`` (in the channel's unit) is the largest standard
-    deviation of the filled values, NaN if the gap is not filled because it is too long or has no neighbours."""
+    """A gap: samples from ``first`` to before ``end``. ``largest_deviation`` (in the channel's unit) is the largest
+    standard deviation of the filled values, NaN if the gap is not filled because it is too long or has no
+    neighbours.
+    """
 
     first: int
     end: int
-    doubt: float
+    largest_deviation: float
 
 
 def true_runs(holds: np.ndarray) -> np.ndarray:
@@ -57,7 +59,7 @@ def true_runs(holds: np.ndarray) -> np.ndarray:
     return edges.reshape(-1, 2)
 
 
-def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarray, list[Gap]]:
+def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarray, list[Gap]]:
     """Values (n,), sampled every ``period`` (s), with gaps of up to ``longest`` (s) filled, and all gaps.
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
@@ -65,13 +67,13 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
     lost = true_runs(np.isnan(values)).tolist()
     if not lost:
         return values, []
-    out, mean, span = values.copy(), float(np.nanmean(values)), max(round(SPAN / period), 4)
+    out, mean, span = values.copy(), float(np.nanmean(values)), max(round(NEIGHBOUR_SPAN / period), 4)
     every = max(2 * span // MOST_NEIGHBOURS, 1)
     law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
     gaps = []
     for first, end in lost:
         doubt = np.nan
-        known = _neighbours(values, first, end, span, every)
+        known = _neighbour_samples(values, first, end, span, every)
         if len(known) and (end - first) * period <= longest * (1 + 1e-9):
             guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
@@ -79,23 +81,25 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
     return out, gaps
 
 
-def bridged(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
+def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
     """All samples (n,) of a signal with short gaps filled, the gaps, and findings on them; InputError where a gap is
     too long."""
     period = recording.period
-    values, gaps = filled(recording.samples(signal), period, BRIDGED)
-    for gap in (gap for gap in gaps if np.isnan(gap.doubt)):
+    values, gaps = filled_samples(recording.samples(signal), period, LONGEST_BRIDGED_GAP)
+    for gap in (gap for gap in gaps if np.isnan(gap.largest_deviation)):
         text = (
-            f"is silent from {gap.first * period:.6g} s to {gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are "
+            f"is silent from {gap.first * period:.6g} s to {gap.end * period:.6g} s: gaps of at most "
+            f"{LONGEST_BRIDGED_GAP:g} s are "
             "bridged; take a stretch without this one (clock.start, clock.duration)"
         )
         raise InputError(signal.file, signal.channel, None, text)
     if not gaps:
         return values, gaps, ()
-    longest, worst = max(gap.end - gap.first for gap in gaps) * period, max(gaps, key=lambda gap: gap.doubt)
+    longest, worst = max(gap.end - gap.first for gap in gaps) * period, max(gaps, key=lambda gap: gap.largest_deviation)
     text = (
         f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged by what the channel itself "
-        f"makes most likely, with a standard deviation of {worst.doubt:.3g} {UNITS[signal.quantity]} at "
+        f"makes most likely, with a standard deviation of {worst.largest_deviation:.3g} "
+        f"{UNIT_OF_QUANTITY[signal.quantity]} at "
         f"{worst.first * period:.6g} s, the largest."
     )
     times = gaps[0].first * period, gaps[-1].end * period
@@ -112,7 +116,7 @@ def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
     return np.pad(law, (0, max(lags - len(there), 0)))
 
 
-def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int) -> np.ndarray:
+def _neighbour_samples(values: np.ndarray, first: int, end: int, span: int, every: int) -> np.ndarray:
     """Indices of measured samples around a gap: all of the nearest ones, and every ``every``-th of those farther
     away."""
     near = np.arange(1, span + 1)
@@ -139,15 +143,16 @@ def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tup
     """Values (n,) in SI with NaN in place of values that cannot be measurements, and a finding on them; times (n,) in
     s.
 
-    A sample is absurd if it is a mark, or beyond LIMITS and FAR_RATIO times farther from the median than half of all.
+    A sample is absurd if it is a mark, or beyond LARGEST_PLAUSIBLE and FAR_RATIO times farther from the median than
+    half of all.
     """
-    if not (np.abs(values) > LIMITS[signal.quantity]).any():
+    if not (np.abs(values) > LARGEST_PLAUSIBLE[signal.quantity]).any():
         return values, None
-    absurd = ~(np.abs(values) < MARK) & ~np.isnan(values)
+    absurd = ~(np.abs(values) < MISSING_VALUE_MARK) & ~np.isnan(values)
     good = values[~absurd & ~np.isnan(values)]
     if len(good):
         away = np.abs(good - np.median(good))
-        far = np.maximum(FAR_RATIO * np.median(away), LIMITS[signal.quantity])
+        far = np.maximum(FAR_RATIO * np.median(away), LARGEST_PLAUSIBLE[signal.quantity])
         absurd[np.flatnonzero(~absurd & ~np.isnan(values))[away > far]] = True
     if not absurd.any():
         return values, None

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.measured.signal import Quantity, Signal
 
-NAMES: dict[Quantity, dict[str, float]] = {
+UNIT_FACTORS: dict[Quantity, dict[str, float]] = {
     "force": {"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216, "kip": 4448.2216},
     "moment": {"N m": 1.0, "kN m": 1e3},
     "acceleration": {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "ft/s^2": 0.3048},
@@ -18,14 +18,14 @@ NAMES: dict[Quantity, dict[str, float]] = {
 }
 """Units that files are written in, and their factors."""
 RATIO_DIFFERENCE = 0.2
-"""Part by which a ratio may differ from that of two units; a calibration is not wrong by more than GAIN."""
-GAIN = 0.25
-EMPTY = 0.05
+"""Part by which a ratio may differ from that of two units; a calibration is not wrong by more than SUSPICIOUS_GAIN."""
+SUSPICIOUS_GAIN = 0.25
+NEGLIGIBLE_MEAN_SHARE = 0.05
 """Share of the static load below which a mean is none, where the force varies by more."""
-Wrong = Literal["sign", "unit", "gain", "size"]
+WrongFactor = Literal["sign", "unit", "gain", "size"]
 
 
-def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
+def probable_mistake(ratio: float, signal: Signal) -> tuple[WrongFactor, str]:
     """Probable mistake behind a ratio of recorded to true value, and, for a unit, which unit was taken for which.
 
     "size" means that no two usual units explain the ratio. Of several pairs of units, one that contains the map's unit
@@ -33,9 +33,9 @@ def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
     """
     if ratio < 0:
         return "sign", ""
-    if abs(ratio - 1) <= GAIN:
+    if abs(ratio - 1) <= SUSPICIOUS_GAIN:
         return "gain", ""
-    units = NAMES[signal.quantity]
+    units = UNIT_FACTORS[signal.quantity]
     far = {
         (units[taken] != signal.factor, abs(np.log(ratio * units[true] / units[taken]))): f"{true} taken for {taken}"
         for true in units
@@ -46,9 +46,9 @@ def probable_mistake(ratio: float, signal: Signal) -> tuple[Wrong, str]:
     return ("unit", far[min(near)]) if near else ("size", "")
 
 
-def sentence(
-    ratio: float, signal: Signal, reference: str, remedies: Mapping[Wrong, str] | None = None
-) -> tuple[Wrong, str]:
+def cause_and_sentence(
+    ratio: float, signal: Signal, reference: str, remedies: Mapping[WrongFactor, str] | None = None
+) -> tuple[WrongFactor, str]:
     """The cause of a wrong factor and a sentence about it; ``reference`` names the source of the true value.
 
     remedies : what to do about each, None for those of a channel map.
@@ -56,13 +56,13 @@ def sentence(
     kind, unit = probable_mistake(ratio, signal)
     reads = f"{signal.name} reads {ratio:.4g} times {reference}"
     reading = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {reference}"
-    texts: dict[Wrong, str] = {
+    texts: dict[WrongFactor, str] = {
         "sign": f"{reads}: its sign is wrong",
         "unit": f"{reads}, as {unit} does",
         "gain": reading,
         "size": f"{reads}, which no usual unit explains",
     }
-    in_map: dict[Wrong, str] = {
+    in_map: dict[WrongFactor, str] = {
         "sign": f"give sign = {-signal.sign} in the channel map",
         "unit": "correct its unit in the channel map",
         "gain": "check its calibration factor",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.finding import Finding
-from models.measured.channel import BLOCK
+from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.columns import Columns, MemoryColumns
 from models.measured.signal import Signal
 
@@ -58,7 +58,7 @@ class Recording:
         """All samples (count,) of one signal in SI units; NaN where nothing was measured."""
         return self.columns.read(signal.name)
 
-    def blocks(self, signals: tuple[Signal, ...], length: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:
+    def blocks(self, signals: tuple[Signal, ...], length: int = SAMPLES_PER_BLOCK) -> Iterator[tuple[int, np.ndarray]]:
         """Index of the first sample, and samples (n, signals), block by block."""
         names = tuple(s.name for s in signals)
         for first in range(0, self.count, length):

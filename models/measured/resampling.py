@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from models.measured.timing import EVEN_CLOCK_SHARE, GAP
+from models.measured.timing import EVEN_CLOCK_SHARE, GAP_PERIODS
 
-PASS, STOP, ATTENUATION = 0.4, 0.5, 60.0
+PASS_BAND, STOP_BAND, STOP_ATTENUATION = 0.4, 0.5, 60.0
 """Of the new rate: kept up to here, gone (dB) from here on."""
 EQUAL_RATES = 1e-6
 """Relative difference of two rates that are one."""
@@ -22,22 +22,24 @@ def resample_to(times: np.ndarray, values: np.ndarray, source_period: float, gri
     times, values = times[known], values[known]
     new = float(grid[1] - grid[0]) if len(grid) > 1 else source_period
     if source_period < new * (1.0 - EQUAL_RATES):
-        samples = _decimated(times, values, source_period, new, grid)
+        samples = _decimated_values(times, values, source_period, new, grid)
     else:
         samples = np.interp(grid, times, values)
-    samples[_unknown(times, source_period, grid)] = np.nan
+    samples[_unknown_points(times, source_period, grid)] = np.nan
     return samples
 
 
-def _unknown(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
+def _unknown_points(times: np.ndarray, source_period: float, grid: np.ndarray) -> np.ndarray:
     """Which points (n,) of the grid lie in a gap or outside the measurement, with a tolerance for rounding."""
     right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
     near = np.minimum(np.abs(grid - times[right - 1]), np.abs(times[right] - grid)) <= EVEN_CLOCK_SHARE * source_period
-    wide = times[right] - times[right - 1] > GAP * source_period
+    wide = times[right] - times[right - 1] > GAP_PERIODS * source_period
     return ((grid < times[0]) | (grid > times[-1]) | wide) & ~near
 
 
-def _decimated(times: np.ndarray, values: np.ndarray, source_period: float, new: float, grid: np.ndarray) -> np.ndarray:
+def _decimated_values(
+    times: np.ndarray, values: np.ndarray, source_period: float, new: float, grid: np.ndarray
+) -> np.ndarray:
     """Values filtered by a symmetric low-pass kernel, which adds no phase, then interpolated by a cubic spline, which
     is accurate enough at that sampling rate."""
     from scipy.interpolate import CubicSpline
@@ -46,8 +48,8 @@ def _decimated(times: np.ndarray, values: np.ndarray, source_period: float, new:
     count = round((times[-1] - times[0]) / source_period) + 1
     even = times[0] + source_period * np.arange(count)
     nyquist, rate = 0.5 / source_period, 1.0 / new
-    taps, beta = kaiserord(ATTENUATION, (STOP - PASS) * rate / nyquist)
-    kernel = firwin(taps | 1, 0.5 * (PASS + STOP) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
+    taps, beta = kaiserord(STOP_ATTENUATION, (STOP_BAND - PASS_BAND) * rate / nyquist)
+    kernel = firwin(taps | 1, 0.5 * (PASS_BAND + STOP_BAND) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
     reach = min(len(kernel) // 2, count - 1)
     padded = np.pad(np.interp(even, times, values), reach, mode="reflect", reflect_type="odd")
     padded = np.pad(padded, len(kernel) // 2 - reach, mode="edge")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 Quantity = Literal["force", "moment", "acceleration", "angular rate", "angle", "travel", "strain"]
-UNITS: dict[Quantity, str] = {
+UNIT_OF_QUANTITY: dict[Quantity, str] = {
     "force": "N",
     "moment": "N m",
     "acceleration": "m/s^2",
@@ -15,7 +15,7 @@ UNITS: dict[Quantity, str] = {
     "strain": "-",
 }
 """The SI unit of each quantity: that of every recording."""
-HUB: tuple[tuple[str, Quantity, str, str], ...] = (
+HUB_COMPONENTS: tuple[tuple[str, Quantity, str, str], ...] = (
     ("Fx", "force", "x", "N"),
     ("Fy", "force", "y", "N"),
     ("Fz", "force", "z", "N"),

@@ -27,7 +27,7 @@ class ChannelPair:
 
 
 @dataclass(frozen=True)
-class Shift:
+class TimeShift:
     """Time shift between run and measurement. seconds : time on the measurement's clock at the run's time 0;
     correlation : mean at this shift over the channels that move, at best 1, NaN where none moves and the shift is 0."""
 
@@ -35,18 +35,18 @@ class Shift:
     correlation: float
 
 
-def time_shift(pairs: Sequence[ChannelPair]) -> Shift:
+def time_shift(pairs: Sequence[ChannelPair]) -> TimeShift:
     """Time shift at which the channels correlate best, with a resolution finer than a sample. Means and scales do not
     matter."""
-    moving = [pair for pair in pairs if _varies(pair.run) and _varies(pair.values)]
+    moving = [pair for pair in pairs if _signal_varies(pair.run) and _signal_varies(pair.values)]
     if not moving:
-        return Shift(0.0, np.nan)
+        return TimeShift(0.0, np.nan)
     step = _search_step(moving)
     coarse = _coarse_shift(moving, step)
     return _refined_shift(moving, coarse, step)
 
 
-def _varies(values: np.ndarray) -> bool:
+def _signal_varies(values: np.ndarray) -> bool:
     finite = values[np.isfinite(values)]
     return bool(len(finite) > 2 and np.var(finite) > CONSTANT_VARIANCE * np.mean(finite**2))
 
@@ -66,11 +66,11 @@ def _coarse_shift(pairs: Sequence[ChannelPair], step: float) -> float:
     begin = min(float(pair.times[0]) for pair in pairs)
     scores = [_correlations(*_on_grid(pair, first, begin, step)) for pair in pairs]
     length = min(map(len, scores))
-    before = len(_grid(pairs[0].run_times, first, step)) - 1
+    before = len(_even_grid(pairs[0].run_times, first, step)) - 1
     return begin - first + step * (int(np.argmax(sum(score[:length] for score in scores))) - before)
 
 
-def _grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
+def _even_grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
     return first + step * np.arange(int((times[-1] - first) / step) + 1)
 
 
@@ -80,8 +80,8 @@ def _on_grid(
     """The run's values (n,), the measurement's values (m,), and whether they were measured (m,), on even time grids
     that begin at the two starts (s)."""
     grid, ours, measured = (
-        _grid(channel_pair.times, begin, step),
-        _grid(channel_pair.run_times, first, step),
+        _even_grid(channel_pair.times, begin, step),
+        _even_grid(channel_pair.run_times, first, step),
         np.isfinite(channel_pair.values),
     )
     there = np.interp(grid, channel_pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
@@ -108,7 +108,7 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
     return np.where(enough, likeness, -1.0)
 
 
-def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> Shift:
+def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> TimeShift:
     """Shift with the largest mean correlation within one step of a coarse shift; the run is interpolated by splines."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
@@ -122,7 +122,7 @@ def _refined_shift(pairs: Sequence[ChannelPair], coarse: float, step: float) -> 
         apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": SHIFT_RESOLUTION * step}
     )
     seconds = float(best.x) if best.fun <= apart(coarse) else coarse
-    return Shift(seconds, -apart(seconds))
+    return TimeShift(seconds, -apart(seconds))
 
 
 def _correlation_at_shift(

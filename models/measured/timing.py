@@ -8,29 +8,29 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 
-GAP = 1.5
+GAP_PERIODS = 1.5
 """Periods: two samples farther apart have a gap between them."""
-SHUFFLED = 10.0
+SHUFFLED_PERIODS = 10.0
 """Periods: a sample that is late by no more was only written late; a clock that goes back farther began anew."""
 EVEN_CLOCK_SHARE = 0.01
 """Of a period: samples as near to an even clock are on it; farther off, the clock jitters."""
-JITTER = 0.1
+JITTER_SHARE = 0.1
 """Of a period: a standard deviation of the steps that is worth a doubt."""
 
 
 ROUNDING_SHARE = 1e-9
 """Of a period: what double precision may round off a time without a word."""
-SLIPS = 5
+LEAST_SLIPS = 5
 """Repeated times, or steps that are off, from which on rounding may be what makes them: one is a row written twice."""
-DIGITS = range(1, 9)
+RATE_DIGITS = range(1, 9)
 """Of the rate of an even clock: the fewest that explain all rounded times."""
 LARGEST_TIME_RATIO = 1e4
 """Lengths of the whole measurement: a time that is farther from the middle one is no time."""
-SEVERAL = 0.01
+REPEATED_TIME_SHARE = 0.01
 """Part of all samples that may share their time with another one: what is dropped then does no harm."""
 
 
-Say = Callable[[str, Weight, str, float, str, Iterable[float]], None]
+ReportFinding = Callable[[str, Weight, str, float, str, Iterable[float]], None]
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class Timing:
         return float(self.times[-1])
 
 
-def timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
+def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
     """Times of samples (n,) given in the order of the file at ``place``; InputError where fewer than two times
     differ."""
     wrong = _no_times(times)
     if wrong.any():
-        kept, first = timing(times[~wrong], place, signal_names), int(np.argmax(wrong))
+        kept, first = sample_timing(times[~wrong], place, signal_names), int(np.argmax(wrong))
         text = (
             f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
             f"{times[first]:.4g} s; they are left out."
@@ -98,7 +98,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
     rising = steps[steps > 0]
     if not len(rising):
         raise InputError(place, "time", None, "two samples or more at different times are needed")
-    even = rounded(times)
+    even = even_clock(times)
     if even is not None:
         same = whole - 1 - len(rising)
         say(
@@ -113,8 +113,8 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
         return Timing(even[0] + even[1] * np.arange(whole), None, even[1], tuple(findings))
     period = float(f"{_step(times, rising):.9g}")
     if (steps < 0).any():
-        deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED * period))
-        if deepest > SHUFFLED * period:
+        deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
+        if deepest > SHUFFLED_PERIODS * period:
             keep = keep[: at + 1]
             say(
                 "time",
@@ -141,7 +141,7 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
     if repeated.any():
         first, count = float(times[keep][1:][repeated][0]), int(np.count_nonzero(repeated))
         text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
-        if count > SEVERAL * len(keep):
+        if count > REPEATED_TIME_SHARE * len(keep):
             say(
                 "time",
                 "error",
@@ -156,8 +156,8 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
         keep = keep[np.concatenate(([True], ~repeated))]
         order = keep
     kept = times[keep]
-    _gaps(kept, period, say)
-    _jitter(kept, period, say)
+    _report_gaps(kept, period, say)
+    _report_jitter(kept, period, say)
     return Timing(kept, order, period, tuple(findings))
 
 
@@ -174,34 +174,34 @@ def _step(times: np.ndarray, rising: np.ndarray) -> float:
     return float(rising.sum() / counted.sum()) if counted.sum() else middle
 
 
-def rounded(times: np.ndarray) -> tuple[float, float] | None:
+def even_clock(times: np.ndarray) -> tuple[float, float] | None:
     """Start and period (s) of an even clock whose times (n,) were rounded coarsely, so that some repeat or the clock
     seems to jitter; None if the rounding is fine, or no even clock explains the times.
 
     Rounding moves a time by less than the spacing of rounded times. The differences from the right clock therefore lie
     in a band of that width, and few clocks satisfy this. The one whose rate has the fewest digits is taken.
     """
-    width, count = _spacing(times), np.arange(len(times))
+    width, count = _rounding_spacing(times), np.arange(len(times))
     if width is None:
         return None
     slope = float(np.polyfit(count - count.mean(), times - times.mean(), 1)[0])
-    for period in [*(1 / float(f"{1 / slope:.{digits}g}") for digits in DIGITS), slope]:
+    for period in [*(1 / float(f"{1 / slope:.{digits}g}") for digits in RATE_DIGITS), slope]:
         off = times - period * count
         if np.ptp(off) <= width * (1 + 1e-6):
             return float(0.5 * (off.min() + off.max())), period
     return None
 
 
-def _spacing(times: np.ndarray) -> float | None:
+def _rounding_spacing(times: np.ndarray) -> float | None:
     """Spacing (s) to which times (n,) are coarsely rounded: the step between different times, or a power of ten; None
     if not."""
     steps = np.diff(times)
     if not np.isfinite(times).all() or (steps < 0).any():
         return None
-    if np.count_nonzero(steps == 0) >= SLIPS:
+    if np.count_nonzero(steps == 0) >= LEAST_SLIPS:
         return float(np.median(steps[steps > 0]))
     middle = float(np.median(steps))
-    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < SLIPS:
+    if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < LEAST_SLIPS:
         return None
     for digits in range(7):
         whole = times * 10.0**digits
@@ -210,9 +210,9 @@ def _spacing(times: np.ndarray) -> float | None:
     return None
 
 
-def _gaps(times: np.ndarray, period: float, say: Say) -> None:
+def _report_gaps(times: np.ndarray, period: float, say: ReportFinding) -> None:
     steps = np.diff(times)
-    wide = np.flatnonzero(steps > GAP * period)
+    wide = np.flatnonzero(steps > GAP_PERIODS * period)
     if len(wide):
         longest = wide[np.argmax(steps[wide])]
         lost = float(np.sum(steps[wide] - period))
@@ -227,12 +227,12 @@ def _gaps(times: np.ndarray, period: float, say: Say) -> None:
         )
 
 
-def _jitter(times: np.ndarray, period: float, say: Say) -> None:
+def _report_jitter(times: np.ndarray, period: float, say: ReportFinding) -> None:
     steps = np.diff(times)
-    deviations = steps[steps <= GAP * period] - period
+    deviations = steps[steps <= GAP_PERIODS * period] - period
     spread = float(deviations.std())
     if spread > EVEN_CLOCK_SHARE * period:
-        weight: Weight = "doubt" if spread > JITTER * period else "note"
+        weight: Weight = "doubt" if spread > JITTER_SHARE * period else "note"
         say(
             "jitter",
             weight,

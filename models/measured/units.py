@@ -4,11 +4,11 @@ import re
 from functools import cache
 from typing import Any
 
-from models.core.errors import InputError, suggestion
+from models.core.errors import InputError, suggestion_phrase
 from models.machine.left_out import let_in
-from models.measured.signal import UNITS, Quantity
+from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 
-SPELT = {
+UNIT_SPELLINGS = {
     "Grad": "degree",
     "Grad/s": "degree/s",
     "deg.": "degree",
@@ -23,11 +23,11 @@ SPELT = {
     "ustrain": "microstrain",
 }
 """Whole spellings that pint does not know or takes for something else: Grad is German for degree, to pint 1e9 rad."""
-AMBIGUOUS = ("grad",)
+AMBIGUOUS_UNITS = ("grad",)
 """Degrees to some, gon to others."""
-GRAVITY = ("g", "G", "gn", "g_n")
+GRAVITY_UNITS = ("g", "G", "gn", "g_n")
 """In a unit of acceleration; to pint a gram."""
-TURNS = {
+ANGLE_UNITS = {
     "radian",
     "milliradian",
     "microradian",
@@ -40,7 +40,7 @@ TURNS = {
     "arcsecond",
 }
 """One of these must be in a unit of an angle: to pint turns, percent and pure numbers are one kind."""
-EXAMPLES: dict[Quantity, tuple[str, ...]] = {
+UNIT_EXAMPLES: dict[Quantity, tuple[str, ...]] = {
     "force": ("N", "kN", "lbf"),
     "moment": ("N m", "kN m", "lbf ft"),
     "acceleration": ("m/s^2", "g", "mm/s^2"),
@@ -51,12 +51,12 @@ EXAMPLES: dict[Quantity, tuple[str, ...]] = {
 }
 
 
-def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float:
+def factor_to_si(unit: str, quantity: Quantity, file: object, place: str) -> float:
     """Factor that converts a unit to SI: value in SI = value * factor.
 
     Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
     """
-    parsed = _parsed(unit, quantity)
+    parsed = _parsed_unit(unit, quantity)
     if parsed is None:
         raise InputError(
             file,
@@ -64,7 +64,7 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
             unit,
             f"no such unit is known: write {_units_of_quantity(quantity)}{_intended_unit(unit, quantity)}",
         )
-    if not parsed.is_compatible_with(_si(quantity)):
+    if not parsed.is_compatible_with(_si_unit(quantity)):
         raise InputError(
             file,
             place,
@@ -78,7 +78,7 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
         raise InputError(
             file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_units_of_quantity(quantity)}"
         )
-    return float(_registry().Quantity(1.0, parsed).to(_si(quantity)).magnitude)
+    return float(_unit_registry().Quantity(1.0, parsed).to(_si_unit(quantity)).magnitude)
 
 
 def factor_between(unit: str, target_unit: str, file: object, place: str) -> float:
@@ -87,26 +87,26 @@ def factor_between(unit: str, target_unit: str, file: object, place: str) -> flo
     Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
     number.
     """
-    goal = _parsed(target_unit, "force")
-    accelerates = goal is not None and goal.is_compatible_with(_si("acceleration"))
-    given = _parsed(unit, "acceleration" if accelerates else "force")
+    goal = _parsed_unit(target_unit, "force")
+    accelerates = goal is not None and goal.is_compatible_with(_si_unit("acceleration"))
+    given = _parsed_unit(unit, "acceleration" if accelerates else "force")
     if given is None or goal is None or not given.is_compatible_with(goal) or _has_angle(given) != _has_angle(goal):
         told = "no such unit is known" if given is None else "is the unit of another quantity"
         raise InputError(file, place, unit, f"{told}: the channel is in {target_unit or '-'}")
-    return float(_registry().Quantity(1.0, given).to(goal).magnitude)
+    return float(_unit_registry().Quantity(1.0, given).to(goal).magnitude)
 
 
 def _has_angle(unit: Any) -> bool:
     """Whether an angle occurs in a unit of pint."""
-    return bool(TURNS & set(re.split(r"[^a-z_]+", str(unit))))
+    return bool(ANGLE_UNITS & set(re.split(r"[^a-z_]+", str(unit))))
 
 
-def quantities(unit: str) -> tuple[Quantity, ...]:
+def quantities_of_unit(unit: str) -> tuple[Quantity, ...]:
     """Quantities that can have this unit; empty for no unit, which gives no information."""
     kinds = list[Quantity]()
-    for kind in UNITS if unit.strip() else ():
+    for kind in UNIT_OF_QUANTITY if unit.strip() else ():
         try:
-            conversion(unit, kind, "", "")
+            factor_to_si(unit, kind, "", "")
             kinds.append(kind)
         except InputError:
             pass
@@ -114,26 +114,28 @@ def quantities(unit: str) -> tuple[Quantity, ...]:
 
 
 @cache
-def _registry() -> Any:
+def _unit_registry() -> Any:
     let_in("pint")
     import pint
 
     return pint.UnitRegistry()
 
 
-def _si(quantity: Quantity) -> Any:
-    return _registry().parse_units(UNITS[quantity].replace("-", ""))
+def _si_unit(quantity: Quantity) -> Any:
+    return _unit_registry().parse_units(UNIT_OF_QUANTITY[quantity].replace("-", ""))
 
 
-def _parsed(unit: str, quantity: Quantity) -> Any:
+def _parsed_unit(unit: str, quantity: Quantity) -> Any:
     """The unit as a pint unit; None if pint does not know it."""
     text = unit.strip().strip("[]").strip()
-    if quantity == "acceleration" and text in GRAVITY:
+    if quantity == "acceleration" and text in GRAVITY_UNITS:
         text = "standard_gravity"
-    text = re.sub(r"\b([kMmcd]|da)?N[.\-·]?m\b", r"\1N m", SPELT.get(text, text))  # Nm is a number of metres to pint
+    text = re.sub(
+        r"\b([kMmcd]|da)?N[.\-·]?m\b", r"\1N m", UNIT_SPELLINGS.get(text, text)
+    )  # Nm is a number of metres to pint
     text = re.sub(r"(?<=/)(s|sec)(2|²)$", "s^2", text)
     try:
-        return None if text.split("/")[0] in AMBIGUOUS else _registry().parse_units(text)
+        return None if text.split("/")[0] in AMBIGUOUS_UNITS else _unit_registry().parse_units(text)
     except Exception:  # pint's parser raises whatever its tokens raise, down to AssertionError
         return None
 
@@ -142,16 +144,16 @@ def _kind_of_quantity(unit: Any) -> str:
     """The kind of quantity that a unit measures, as an engineer calls it."""
     if "volt" in str(unit) or "ampere" in str(unit):
         return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
-    same = [name for name in UNITS if unit.is_compatible_with(_si(name))]
+    same = [name for name in UNIT_OF_QUANTITY if unit.is_compatible_with(_si_unit(name))]
     if unit.dimensionless:
         return "is a pure number"
     return f"is a unit of {same[0]}" if same else f"is {unit:P}"
 
 
 def _intended_unit(unit: str, quantity: Quantity) -> str:
-    return suggestion(unit, EXAMPLES[quantity])
+    return suggestion_phrase(unit, UNIT_EXAMPLES[quantity])
 
 
 def _units_of_quantity(quantity: Quantity) -> str:
-    *others, last = EXAMPLES[quantity]
+    *others, last = UNIT_EXAMPLES[quantity]
     return f"{', '.join(others)} or {last}"

@@ -10,13 +10,13 @@ import numpy as np
 from models.engines.free_vehicle import ENGINES, free_model
 from models.engines.native_parts import SLIDES
 from models.multibody.plain.joint_elements import Acting, PlainTree
-from models.own_model.constraints import Rows, by_differences, plain_constraints, tied
+from models.own_model.constraints import Rows, by_differences, constrained_forces, plain_constraints
 from models.own_model.coordinates import MujocoState
-from models.own_model.reading import TwinModel, controls
+from models.own_model.reading import TwinModel, constant_controls
 
-PLAIN = "plain"
-BUILDS = (*ENGINES, PLAIN)
-SOFT = "mujoco"
+PLAIN_BUILD = "plain"
+ALL_BUILDS = (*ENGINES, PLAIN_BUILD)
+SOFT_BUILD = "mujoco"
 """The build whose constraints are soft, as the file's own; those of the others are rigid."""
 
 
@@ -30,23 +30,23 @@ class Moved(NamedTuple):
 
 State = tuple[np.ndarray, np.ndarray]
 """Coordinates and rates (n,)."""
-WHOLE = 1.0 - 1e-12
+WHOLE_FRICTION_SHARE = 1.0 - 1e-12
 """Share of a dry friction's force from which it is whole."""
 Equations = Callable[[np.ndarray, np.ndarray], Moved]
 """Of coordinates and rates (n,)."""
 
 
-def equations(twin: TwinModel, build: str) -> Equations:
+def equations_of_build(twin: TwinModel, build: str) -> Equations:
     """Equations of motion of the description as "exudyn", "mujoco" or "plain" builds it; constraints are soft in
     MuJoCo, else rigid."""
-    built: Any = plain_tree(twin) if build == PLAIN else free_model(build, twin.driven)
-    rigid = twin.driven.tied and build != SOFT
-    asked = _asked(twin, built.ties if build != PLAIN else None) if rigid else None
+    built: Any = plain_tree(twin) if build == PLAIN_BUILD else free_model(build, twin.driven)
+    rigid = twin.driven.tied and build != SOFT_BUILD
+    asked = _constraint_rows(twin, built.ties if build != PLAIN_BUILD else None) if rigid else None
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = built.mass_and_force(0.0, q, v)
         if asked is not None:
-            force = tied(mass, force, *asked(q, v))
+            force = constrained_forces(mass, force, *asked(q, v))
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
@@ -57,14 +57,16 @@ def largest_gap(twin: TwinModel, build: str, states: Sequence[State]) -> float:
     it: bodies in wrong relative positions can have the same accelerations."""
     if not twin.driven.tied:
         return 0.0
-    if build == PLAIN:
+    if build == PLAIN_BUILD:
         constraints = plain_constraints(twin)
         return max(float(np.abs(constraints.gap(q).size).max()) for q, _ in states)
     built: Any = free_model(build, twin.driven)
     return max(float(np.abs(built.gaps(q)).max(initial=0.0)) for q, _ in states)
 
 
-def _asked(twin: TwinModel, rows_at: Rows | None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+def _constraint_rows(
+    twin: TwinModel, rows_at: Rows | None
+) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Function that gives the constraint rows J (c, n) and J' q' (c,) at a state, from plain equations, or by
     differences of an engine's J."""
     if rows_at is None:
@@ -89,10 +91,10 @@ def plain_tree(twin: TwinModel) -> PlainTree:
     return PlainTree(twin.driven.vehicle, twin.driven.gravity, Acting(loads, lines, frictions, turns, pushes))
 
 
-def expected(twin: TwinModel, build: str) -> Equations:
+def expected_equations(twin: TwinModel, build: str) -> Equations:
     """The motion with which a build must agree: the file's own model, with rigid constraints unless the build is
     MuJoCo's."""
-    return as_parsed(twin) if build == SOFT or not twin.driven.tied else rigid(twin)
+    return as_parsed(twin) if build == SOFT_BUILD or not twin.driven.tied else rigid_equations(twin)
 
 
 def as_parsed(twin: TwinModel) -> Equations:
@@ -100,25 +102,25 @@ def as_parsed(twin: TwinModel) -> Equations:
     data = mujoco.MjData(twin.model)
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
-        state = forward(twin, data, q, v)
-        mass, force = _of_file(twin, data, state, data.qfrc_constraint)
+        state = forward_state(twin, data, q, v)
+        mass, force = _mass_and_forces_of_file(twin, data, state, data.qfrc_constraint)
         return Moved(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.rest))
 
     return move
 
 
-def rigid(twin: TwinModel) -> Equations:
+def rigid_equations(twin: TwinModel) -> Equations:
     """The file's own model as MuJoCo parsed it, its equality constraints made rigid."""
     data = mujoco.MjData(twin.model)
-    asked = _asked(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
+    asked = _constraint_rows(twin, lambda places: [_rows_of_file(twin, data, q) for q in places])
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         rows, rest = asked(q, v)
-        state = forward(twin, data, q, v)
+        state = forward_state(twin, data, q, v)
         ties, others = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty(twin.size)
         mujoco.mj_mulJacTVec(twin.model, data, others, np.where(ties, 0.0, data.efc_force))
-        mass, force = _of_file(twin, data, state, others)
-        force = tied(mass, force, rows, rest)
+        mass, force = _mass_and_forces_of_file(twin, data, state, others)
+        force = constrained_forces(mass, force, rows, rest)
         return Moved(mass, force, np.linalg.solve(mass, force))
 
     return move
@@ -126,7 +128,7 @@ def rigid(twin: TwinModel) -> Equations:
 
 def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.ndarray:
     """Jacobian (c, n) of the file's equality constraints with respect to the coordinates of the description."""
-    state = forward(twin, data, q, np.zeros(twin.size))
+    state = forward_state(twin, data, q, np.zeros(twin.size))
     ties, rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY, np.empty((twin.size, data.nefc))
     for row, unit in zip(rows, np.eye(twin.size), strict=True):
         mujoco.mj_mulJacVec(twin.model, data, row, unit)
@@ -134,16 +136,16 @@ def _rows_of_file(twin: TwinModel, data: mujoco.MjData, q: np.ndarray) -> np.nda
     return of_constraints
 
 
-def forward(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:
+def forward_state(twin: TwinModel, data: mujoco.MjData, q: np.ndarray, v: np.ndarray) -> MujocoState:
     """MuJoCo's state at coordinates and rates (n,), and data of the file's own model there."""
     state = twin.coordinates.to_mujoco(q, v)
-    data.ctrl[:] = controls(twin.model)
+    data.ctrl[:] = constant_controls(twin.model)
     data.qpos[:], data.qvel[:], data.time = state.qpos, state.qvel, 0.0
     mujoco.mj_forward(twin.model, data)
     return state
 
 
-def _of_file(
+def _mass_and_forces_of_file(
     twin: TwinModel, data: mujoco.MjData, state: MujocoState, constraint: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass matrix (n, n) and forces (n,) of the file's own model in the coordinates of the description."""
@@ -152,7 +154,7 @@ def _of_file(
     return j.T @ own_mass @ j, j.T @ (data.qfrc_smooth + constraint - own_mass @ state.rest)
 
 
-def sliding(twin: TwinModel, states: Sequence[State]) -> list[State]:
+def sliding_states(twin: TwinModel, states: Sequence[State]) -> list[State]:
     """Those of the states at which every joint with dry friction slides, so that its full friction acts in every build.
 
     MuJoCo's is a soft constraint, whose force is less where a joint sticks.
@@ -163,9 +165,9 @@ def sliding(twin: TwinModel, states: Sequence[State]) -> list[State]:
     data = mujoco.MjData(twin.model)
 
     def slides(q: np.ndarray, v: np.ndarray) -> bool:
-        forward(twin, data, q, v)
+        forward_state(twin, data, q, v)
         of = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
-        whole = np.abs(data.efc_force[of]) >= WHOLE * data.efc_frictionloss[of]
+        whole = np.abs(data.efc_force[of]) >= WHOLE_FRICTION_SHARE * data.efc_frictionloss[of]
         against = data.efc_force[of] * v[data.efc_id[of]] < 0.0
         return bool((whole & against).all() and (np.abs(v[rubbing]) >= SLIDES).all())
 

@@ -16,12 +16,12 @@ import numpy as np
 from models.core.errors import InputError
 from models.own_model.car_bodies import CarBodies, car_bodies
 from models.own_model.car_joints import Roles, forget, roles_of
-from models.own_model.content import KINDS, contents, ranges
-from models.own_model.file import check_sane, compiled
-from models.own_model.names import label, moving, place_of
+from models.own_model.content import CONTENT_KINDS, contents_of_model, limits_switched_off
+from models.own_model.file import check_sane, compiled_model
+from models.own_model.names import label, moving_bodies, place_of
 from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
-from models.own_model.xml_guard import Document, guarded
+from models.own_model.xml_guard import Document, checked_document
 from models.vehicles.free_vehicle import CARRIER, SWAY, rotor
 from models.vehicles.spatial import (
     JointElement,
@@ -38,19 +38,19 @@ from models.vehicles.spatial import (
 from models.vehicles.spatial_linear import preloads
 from models.vehicles.vehicle_checks import check
 
-CONTACT = "contact"
+CONTACT_CONTENT = "contact"
 """The content that a car may have beside twinrig's tyres: it is left out."""
 GRAVITY = 9.81
-DIFFERS = 0.01
+PRELOAD_DIFFERENCE = 0.01
 """Relative difference from which a preload is told that the file has otherwise."""
 
 
-def car(path: Path) -> SpatialVehicle:
+def vehicle_of_file(path: Path) -> SpatialVehicle:
     """The vehicle of an MJCF file, unloaded; InputError for features that vehicles of a scene cannot have."""
-    document = guarded(path)
+    document = checked_document(path)
     if document.kind != "MJCF":
         raise InputError(path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
-    model, _ = compiled(document)
+    model, _ = compiled_model(document)
     check_sane(model, path.name)
     return _Reader(model, document).vehicle()
 
@@ -74,11 +74,11 @@ class _Reader:
         roles = roles_of(model, design, wheels, self.document)
         self._leave_out(roles)
         self._check_gravity()
-        parts = car_bodies(model, design, roles, self.document, _reserved(wheels))
+        parts = car_bodies(model, design, roles, self.document, _reserved_names(wheels))
         elements = tuple(self._elements(parts))
         tyres = tuple(_tyre(wheel, parts) for wheel in wheels)
         axles = tuple(float(next(w.point[0] for w in wheels if w.axle == i)) for i in range(wheels[-1].axle + 1))
-        outputs = (*_outputs(parts, elements, tyres), *self._points(design, parts, wheels))
+        outputs = (*_spatial_outputs(parts, elements, tyres), *self._points(design, parts, wheels))
         vehicle = SpatialVehicle(
             name=file,
             bodies=parts.bodies,
@@ -100,11 +100,11 @@ class _Reader:
         """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
         acted = forget(self.model, roles)
         joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
-        for row in contents(self.model, self.document):
-            if row.kind != CONTACT:
+        for row in contents_of_model(self.model, self.document):
+            if row.kind != CONTACT_CONTENT:
                 said = f"{row.line()}: a vehicle of a scene cannot have it"
                 self._refuse("", None, said)
-            KINDS[CONTACT][2](self.model)
+            CONTENT_KINDS[CONTACT_CONTENT][2](self.model)
             joints.append("contacts")
         for line in line_springs(self.model, self.design):
             self._refuse(line.name, None, "lies along a line between two sites: springs of a car act along joints")
@@ -113,7 +113,7 @@ class _Reader:
         if joints or acted:
             listed = ", ".join((*joints, *acted))
             self.notes.append(f"tyres, steering, brakes and drive are twinrig's; not built: {listed}")
-        if limited := ranges(self.model):
+        if limited := limits_switched_off(self.model):
             self.notes.append(f"stops are not built, and handling says where a run passes them: {', '.join(limited)}")
 
     def _check_gravity(self) -> None:
@@ -123,7 +123,7 @@ class _Reader:
             self._refuse(name, gravity.tolist(), "must be along -z: z is up from the road of a vehicle")
         if gravity[2] != -GRAVITY:
             self.notes.append(f"gravity is {GRAVITY:g} m/s^2, and not the file's {-gravity[2]:g}")
-        for b in moving(self.model):
+        for b in moving_bodies(self.model):
             if self.model.body_gravcomp[b]:
                 self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
 
@@ -154,7 +154,9 @@ class _Reader:
         for s in range(self.model.nsite):
             name, body = self.model.site(s).name, int(self.model.site_bodyid[s])
             if name and s not in taken and body in parts.of:
-                yield PointOutput(name, "acceleration", parts.of[body], _vector(design.site_xpos[s]), (0.0, 0.0, 1.0))
+                yield PointOutput(
+                    name, "acceleration", parts.of[body], _vector_of(design.site_xpos[s]), (0.0, 0.0, 1.0)
+                )
 
     def _at_rest(self, vehicle: SpatialVehicle) -> SpatialVehicle:
         """The vehicle without preloads, since its springs will get those that hold it at rest. A note lists where the
@@ -163,7 +165,7 @@ class _Reader:
         changed = [
             f"{e.name} {held[e.name]:.4g} for {e.held:.4g}"
             for e in vehicle.joint_elements
-            if abs(e.held - held[e.name]) > DIFFERS * abs(held[e.name])
+            if abs(e.held - held[e.name]) > PRELOAD_DIFFERENCE * abs(held[e.name])
         ]
         if changed:
             said = "preloads (N, N m) hold the design position at rest and stand for the file's"
@@ -172,22 +174,24 @@ class _Reader:
         return replace(vehicle, joint_elements=bare, notes=tuple(self.notes))
 
 
-def _reserved(wheels: tuple[WheelSite, ...]) -> set[str]:
+def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
     """Names of bodies that a system adds to a car, so that the file's bodies cannot have them."""
     return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
 
 
 def _tyre(wheel: WheelSite, parts: CarBodies) -> Tyre:
-    at, spin = _vector(wheel.point), parts.spin.get(wheel.name)
+    at, spin = _vector_of(wheel.point), parts.spin.get(wheel.name)
     return Tyre(wheel.name, parts.of[wheel.body], at, wheel.axle, wheel.stiffness, wheel.damping, spin_inertia=spin)
 
 
 def _side_force(wheel: WheelSite, parts: CarBodies) -> SideForce:
-    x, y, _ = _vector(wheel.point)
+    x, y, _ = _vector_of(wheel.point)
     return SideForce(wheel.name, parts.chassis, (x, y, 0.0), parts.chassis, wheel.cornering)
 
 
-def _outputs(parts: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[Tyre, ...]) -> Iterator[SpatialOutput]:
+def _spatial_outputs(
+    parts: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[Tyre, ...]
+) -> Iterator[SpatialOutput]:
     """Motion of the chassis, travels of springs and dampers, forces of tyres."""
     chassis = next(body for body in parts.bodies if body.name == parts.chassis)
     yield PointOutput(chassis.name, "acceleration", chassis.name, chassis.position, (0.0, 0.0, 1.0))
@@ -199,6 +203,6 @@ def _outputs(parts: CarBodies, elements: tuple[JointElement, ...], tyres: tuple[
         yield TyreOutput(f"tyre force {tyre.name}", "tyre force", tyre.name)
 
 
-def _vector(numbers: np.ndarray) -> Vector:
+def _vector_of(numbers: np.ndarray) -> Vector:
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z

@@ -12,15 +12,15 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.own_model.car_joints import Roles, freedom_of, joints_of, told
-from models.own_model.names import moving
-from models.own_model.wheel_sites import SAME, WheelSite
+from models.own_model.car_joints import Roles, freedom_of, joint_text, joints_of
+from models.own_model.names import moving_bodies
+from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
 
-ROUND = 1e-9
+REVOLUTION_TOLERANCE = 1e-9
 """Share of a wheel's inertia by which it may differ from that of a body of revolution about its axle."""
-ROUNDING = 1e-12
+CENTRE_TOLERANCE = 1e-12
 """m: a hinge so near to a centre of mass is in it."""
 
 
@@ -59,7 +59,7 @@ class _Segment:
         order = FREEDOMS.index
         if self.freedoms and order(freedom) <= order(self.freedoms[-1]):
             return False
-        return freedom[0] != "r" or self.anchor is None or bool(np.abs(anchor - self.anchor).max() <= ROUNDING)
+        return freedom[0] != "r" or self.anchor is None or bool(np.abs(anchor - self.anchor).max() <= CENTRE_TOLERANCE)
 
     def add(self, joint: int, freedom: Freedom, sign: float, anchor: np.ndarray) -> None:
         """Add a joint to the segment."""
@@ -87,7 +87,7 @@ class _Builder:
     ) -> None:
         self.model, self.design, self.roles, self.document, self.reserved = model, design, roles, document, reserved
         self.leaders = dict[int, int]()
-        for b in moving(model):
+        for b in moving_bodies(model):
             above = self.leaders.get(int(model.body_parentid[b]))
             joined = b in roles.chassis[1:] or (above is not None and not self._kept(b))
             self.leaders[b] = above if joined and above is not None else b
@@ -103,13 +103,13 @@ class _Builder:
         bodies, coordinates, names = list[Body](), dict[int, tuple[tuple[str, Freedom], float]](), dict[int, str]()
         for leader, masses in self.masses.items():
             names[leader] = self._name(leader)
-            whole, above = combined(masses), self.leaders.get(int(self.model.body_parentid[leader]))
+            whole, above = combined_mass(masses), self.leaders.get(int(self.model.body_parentid[leader]))
             if leader in self.roles.chassis:
-                bodies.append(_body(names[leader], whole, FREEDOMS, None))
+                bodies.append(_body_from_segment(names[leader], whole, FREEDOMS, None))
                 continue
             assert above is not None
             segments = self._segments(leader)
-            bodies += _links(names[leader], names[above], segments, whole, coordinates)
+            bodies += _links_of_body(names[leader], names[above], segments, whole, coordinates)
         named = {b: names[leader] for b, leader in self.leaders.items()}
         return CarBodies(tuple(bodies), names[self.roles.chassis[0]], named, coordinates, self.spin)
 
@@ -135,12 +135,12 @@ class _Builder:
         spinning = set[int]()
         for joint, wheel in self.roles.spin.items():
             body = int(self.model.jnt_bodyid[joint])
-            turned = [b for b in self.leaders if self._rides(b, body)]
+            turned = [b for b in self.leaders if self._rides_on_suspension(b, body)]
             behind = [j for b in turned for j in joints_of(self.model, b) if j > joint]
             if behind:
-                said = f"lies behind {told(self.model, self.document, joint)}, which spins a wheel: nothing may"
-                raise InputError(self.document.path.name, told(self.model, self.document, behind[0]), None, said)
-            whole = combined([self._mass(b) for b in turned])
+                said = f"lies behind {joint_text(self.model, self.document, joint)}, which spins a wheel: nothing may"
+                raise InputError(self.document.path.name, joint_text(self.model, self.document, behind[0]), None, said)
+            whole = combined_mass([self._mass(b) for b in turned])
             self._check_round(whole, wheel, joint)
             self.spin[wheel.name] = float(whole.inertia[1, 1])
             inertia = whole.inertia.copy()
@@ -149,7 +149,7 @@ class _Builder:
             spinning.update(turned)
         return spinning
 
-    def _rides(self, body: int, on: int) -> bool:
+    def _rides_on_suspension(self, body: int, on: int) -> bool:
         while body and body != on:
             body = int(self.model.body_parentid[body])
         return body == on
@@ -158,12 +158,14 @@ class _Builder:
         """Refuse a wheel with imbalance, which would shake as it spins."""
         inertia, beside = whole.inertia, np.abs((whole.centre - wheel.point)[[0, 2]]).max()
         uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
-        if (whole.mass and (beside > SAME or uneven > ROUND * np.trace(inertia))) or not inertia[1, 1] > 0.0:
+        if (
+            whole.mass and (beside > SAME_AXLE_DISTANCE or uneven > REVOLUTION_TOLERANCE * np.trace(inertia))
+        ) or not inertia[1, 1] > 0.0:
             said = (
                 f"spins {wheel.name!r}, whose mass must be one of revolution about the axle: its centre is "
                 f"{beside:.3g} m off, its inertia {np.round(inertia, 9).tolist()} kg m^2"
             )
-            raise InputError(self.document.path.name, told(self.model, self.document, joint), None, said)
+            raise InputError(self.document.path.name, joint_text(self.model, self.document, joint), None, said)
 
     def _segments(self, leader: int) -> list[_Segment]:
         segments = [_Segment()]
@@ -172,14 +174,14 @@ class _Builder:
             if known is None:
                 axis = np.round(self.design.xaxis[joint], 9).tolist()
                 said = "is no hinge or slide along x, y or z of the vehicle: the suspension of a car has no others"
-                raise InputError(self.document.path.name, told(self.model, self.document, joint), axis, said)
+                raise InputError(self.document.path.name, joint_text(self.model, self.document, joint), axis, said)
             if not segments[-1].takes(known[0], anchor):
                 segments.append(_Segment())
             segments[-1].add(joint, *known, anchor)
         return segments
 
 
-def combined(masses: list[Mass]) -> Mass:
+def combined_mass(masses: list[Mass]) -> Mass:
     """One rigid body that has the mass, centre and inertia of all the given ones."""
     if len(masses) == 1:
         return masses[0]
@@ -190,7 +192,7 @@ def combined(masses: list[Mass]) -> Mass:
     return Mass(total, centre, inertia)
 
 
-def _links(
+def _links_of_body(
     name: str,
     above: str,
     segments: list[_Segment],
@@ -201,22 +203,22 @@ def _links(
     names."""
     for number, segment in enumerate(segments):
         last, at = number == len(segments) - 1, segment.anchor
-        itself = last and (at is None or np.abs(at - whole.centre).max() <= ROUNDING)
+        itself = last and (at is None or np.abs(at - whole.centre).max() <= CENTRE_TOLERANCE)
         link = name if itself else f"{name} joint {number + 1}"
         coordinates |= {joint: ((link, freedom), sign) for joint, freedom, sign in segment.joints}
         if itself:
-            yield _body(name, whole, tuple(segment.freedoms), above)
+            yield _body_from_segment(name, whole, tuple(segment.freedoms), above)
             return
-        yield Body(link, 0.0, _vector(whole.centre if at is None else at), tuple(segment.freedoms), parent=above)
+        yield Body(link, 0.0, _vector_of(whole.centre if at is None else at), tuple(segment.freedoms), parent=above)
         above = link
-    yield _body(name, whole, (), above)
+    yield _body_from_segment(name, whole, (), above)
 
 
-def _body(name: str, whole: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
-    x, y, z = map(_vector, whole.inertia)
-    return Body(name, whole.mass, _vector(whole.centre), freedoms, (x, y, z), parent)
+def _body_from_segment(name: str, whole: Mass, freedoms: tuple[Freedom, ...], parent: str | None) -> Body:
+    x, y, z = map(_vector_of, whole.inertia)
+    return Body(name, whole.mass, _vector_of(whole.centre), freedoms, (x, y, z), parent)
 
 
-def _vector(numbers: np.ndarray) -> Vector:
+def _vector_of(numbers: np.ndarray) -> Vector:
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z

@@ -10,16 +10,16 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.content import BIAS, DSBL, GAIN, JOINT_TARGETS, TRN
-from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.names import label, moving
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
+from models.own_model.names import label, moving_bodies
 from models.own_model.reading import is_fixed, tendon_travel
-from models.own_model.wheel_sites import SAME, WheelSite, place
+from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, place
 from models.own_model.xml_guard import Document
 from models.vehicles.spatial import FREEDOMS, Freedom
 
-PARALLEL = 1e-9
+PARALLEL_TOLERANCE = 1e-9
 """Of a unit axis: what it may have beside the axis of the vehicle that it is parallel to."""
-SPECK = 1e-6
+NEGLIGIBLE_MASS = 1e-6
 """kg: lighter bodies only carry joints."""
 
 
@@ -44,35 +44,35 @@ def freedom_of(model: mujoco.MjModel, design: mujoco.MjData, joint: int) -> tupl
     parallel to one of these."""
     axis, kind = design.xaxis[joint], int(model.jnt_type[joint])
     along = int(np.abs(axis).argmax())
-    if kind in (FREE, BALL) or np.abs(np.delete(axis, along)).max() > PARALLEL:
+    if kind in (FREE_JOINT, BALL_JOINT) or np.abs(np.delete(axis, along)).max() > PARALLEL_TOLERANCE:
         return None
-    return FREEDOMS[along + (0 if kind == SLIDE else 3)], float(np.sign(axis[along]))
+    return FREEDOMS[along + (0 if kind == SLIDE_JOINT else 3)], float(np.sign(axis[along]))
 
 
 def roles_of(model: mujoco.MjModel, design: mujoco.MjData, wheels: tuple[WheelSite, ...], document: Document) -> Roles:
     """The role of every joint; InputError where no chassis is free, or a wheel turns in a way that twinrig does not
     have."""
-    chassis = _chassis(model, design, document)
+    chassis = _chassis_bodies(model, design, document)
     spin, steer = dict[int, WheelSite](), dict[int, WheelSite]()
     for wheel in wheels:
-        if (spins := _spin(model, design, wheel, document)) is not None:
+        if (spins := _spin_hinge(model, design, wheel, document)) is not None:
             spin[spins] = wheel
-        for joint in _behind(model, wheel.body, chassis):
+        for joint in _joints_to_ground(model, wheel.body, chassis):
             if (freedom := freedom_of(model, design, joint)) is not None and freedom[0] == "rz":
                 _check_steering(model, design, joint, wheel, document)
                 steer[joint] = wheel
     return Roles(chassis, spin, steer)
 
 
-def told(model: mujoco.MjModel, document: Document, joint: int) -> str:
+def joint_text(model: mujoco.MjModel, document: Document, joint: int) -> str:
     """Text by which messages name a joint."""
     line = document.line(("joint", "freejoint"), model.joint(joint).name)
     return label(model, "joint", joint) + (f" ({line})" if line else "")
 
 
-def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[int, ...]:
+def _chassis_bodies(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -> tuple[int, ...]:
     """Bodies from the ground to the one that completes all six freedoms; those before it are almost massless."""
-    numbers, name = moving(model), document.path.name
+    numbers, name = moving_bodies(model), document.path.name
     roots = [b for b in numbers if int(model.body_parentid[b]) not in numbers]
     if len(roots) > 1:
         names = tuple(model.body(b).name for b in roots)
@@ -82,12 +82,12 @@ def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -
         bodies.append(body)
         for joint in joints_of(model, body):
             known = freedom_of(model, design, joint)
-            free = model.jnt_type[joint] == FREE
+            free = model.jnt_type[joint] == FREE_JOINT
             freedoms += FREEDOMS if free else [] if known is None else [known[0]]
         if len(freedoms) >= len(FREEDOMS):
             break
         riders = [b for b in numbers if int(model.body_parentid[b]) == body]
-        if len(riders) != 1 or model.body_mass[body] > SPECK:
+        if len(riders) != 1 or model.body_mass[body] > NEGLIGIBLE_MASS:
             break
         body = riders[0]
     if sorted(freedoms) != sorted(FREEDOMS):
@@ -97,7 +97,7 @@ def _chassis(model: mujoco.MjModel, design: mujoco.MjData, document: Document) -
     return tuple(bodies)
 
 
-def _behind(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]) -> list[int]:
+def _joints_to_ground(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]) -> list[int]:
     """Joints on the path from the chassis to a body, including the body's own."""
     joints = list[int]()
     while body not in chassis and body:
@@ -106,14 +106,14 @@ def _behind(model: mujoco.MjModel, body: int, chassis: tuple[int, ...]) -> list[
     return joints
 
 
-def _spin(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, document: Document) -> int | None:
+def _spin_hinge(model: mujoco.MjModel, design: mujoco.MjData, wheel: WheelSite, document: Document) -> int | None:
     """The hinge about y through a wheel's centre, on the wheel's body or on one that this body carries; None if there
     is none."""
     bodies = [wheel.body, *(b for b in range(1, model.nbody) if int(model.body_parentid[b]) == wheel.body)]
     spins = []
     for joint in (j for b in bodies for j in joints_of(model, b)):
         known, beside = freedom_of(model, design, joint), (design.xanchor[joint] - wheel.point)[[0, 2]]
-        if known is not None and known[0] == "ry" and np.abs(beside).max() <= SAME:
+        if known is not None and known[0] == "ry" and np.abs(beside).max() <= SAME_AXLE_DISTANCE:
             spins.append(joint)
     if len(spins) > 1:
         names = [model.joint(j).name for j in spins]
@@ -126,7 +126,7 @@ def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of
     """Refuse springs, dampers, rotors and dry friction on joints that twinrig models in another way."""
     for joint in joints:
         first = int(model.jnt_dofadr[joint])
-        freedoms = slice(first, first + (6 if model.jnt_type[joint] == FREE else 1))
+        freedoms = slice(first, first + (6 if model.jnt_type[joint] == FREE_JOINT else 1))
         laws = {
             "stiffness": model.jnt_stiffness[joint],
             "damping": model.dof_damping[freedoms].max(),
@@ -135,7 +135,7 @@ def _check_bare(model: mujoco.MjModel, joints: list[int], document: Document, of
         }
         for law, value in laws.items():
             if value:
-                where = f"{told(model, document, joint)} {law}"
+                where = f"{joint_text(model, document, joint)} {law}"
                 raise InputError(document.path.name, where, float(value), f"must be 0: {of} has none in a vehicle")
 
 
@@ -144,10 +144,10 @@ def _check_steering(
 ) -> None:
     """Refuse another steering than that of the front wheels about the vertical through their centres."""
     beside = round(float(np.linalg.norm((design.xanchor[joint] - wheel.point)[:2])), 9)
-    where = told(model, document, joint)
+    where = joint_text(model, document, joint)
     if wheel.axle:
         raise InputError(document.path.name, where, "rz", f"steers {wheel.name!r}: only wheels of the front axle steer")
-    if beside > SAME:
+    if beside > SAME_AXLE_DISTANCE:
         said = f"m beside the centre of {wheel.name!r}: front wheels steer about the vertical through their centres"
         raise InputError(document.path.name, where, beside, said)
 

@@ -14,35 +14,37 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.own_model.builds import (
-    BUILDS,
-    PLAIN,
-    SOFT,
+    ALL_BUILDS,
+    PLAIN_BUILD,
+    SOFT_BUILD,
     Equations,
     Moved,
     State,
-    equations,
-    expected,
+    equations_of_build,
+    expected_equations,
     largest_gap,
-    sliding,
+    sliding_states,
 )
 from models.own_model.coordinates import several_at_once
 from models.own_model.reading import TwinModel
 from models.own_model.rounding import sensitivities
-from models.own_model.states import COUNT, random_states
+from models.own_model.states import STATE_COUNT, random_states
 
-ALIKE = 1e-10
+EQUAL_ACCELERATION_SHARE = 1e-10
 """Relative difference up to which accelerations are the same."""
-ROUNDING = 1000.0 * float(np.finfo(float).eps)
+ROUNDING_SHARE = 1000.0 * float(np.finfo(float).eps)
 """Share by which numbers may seem to be changed: up to 300 roundings were seen, with 30 joints in a row."""
 WORST_CONDITION = 1e8
 """Condition of a mass matrix beyond which nothing more is put down to rounding."""
-MET = 1e-10
+CONSTRAINT_GAP = 1e-10
 """m, rad: gap up to which a state satisfies the constraints of a build."""
-SINGULAR = "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
-HARDLY = 1e-6
+SINGULAR_MASS_REASON = (
+    "the mass matrix is singular: something without inertia can move, or constraints repeat one another"
+)
+HARDLY_MOVING_SHARE = 1e-6
 """Share of the largest acceleration, weighted with the root of inertia, below which a coordinate hardly moves."""
-TINY = float(np.finfo(float).tiny)
-FASTER = (1.0, 3.0, 10.0)
+SMALLEST_FLOAT = float(np.finfo(float).tiny)
+RATE_FACTORS = (1.0, 3.0, 10.0)
 """Factors of random rates, of which the first is taken at which all dry friction slides."""
 Told = Callable[[float], object]
 """Told the share that is done."""
@@ -54,9 +56,9 @@ class Reference:
     that are judged together with it (n,), its motion at some states, and the sensitivity of this motion to rounding."""
 
     names: tuple[str, ...]
-    together: tuple[slice, ...]
+    judged_together: tuple[slice, ...]
     moved: list[Moved]
-    sensitive: list[Moved]
+    sensitivities: list[Moved]
 
 
 @dataclass(frozen=True)
@@ -82,24 +84,26 @@ class Agreement:
     def same_motion(self) -> bool:
         """Whether accelerations and the mass matrix agree. The matrix counts too, because a force may later act where
         none acts now."""
-        return max(self.acceleration, self.mass) <= ALIKE
+        return max(self.acceleration, self.mass) <= EQUAL_ACCELERATION_SHARE
 
     @property
     def alike(self) -> bool:
         """Whether the motion is the same, and the build's own constraints are met."""
-        return self.same_motion and self.gap <= MET
+        return self.same_motion and self.gap <= CONSTRAINT_GAP
 
 
-def certificate(twin: TwinModel, count: int = COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
+def certificate(twin: TwinModel, count: int = STATE_COUNT, told: Told = lambda share: None) -> tuple[Agreement, ...]:
     """Agreement of every build of the description with the file's own model; RunFailed where dry friction sticks at all
     states."""
     states, rows = states_of(twin, count), list[Agreement]()
-    soft = reference(twin, states, SOFT)
-    rigid = reference(twin, states, PLAIN) if twin.driven.tied else soft
-    for i, build in enumerate(BUILDS):
-        row = agreement(build, soft if build == SOFT else rigid, moved_at(equations(twin, build), states))
+    soft = reference_of_file(twin, states, SOFT_BUILD)
+    rigid = reference_of_file(twin, states, PLAIN_BUILD) if twin.driven.tied else soft
+    for i, build in enumerate(ALL_BUILDS):
+        row = agreement_of_build(
+            build, soft if build == SOFT_BUILD else rigid, moved_at(equations_of_build(twin, build), states)
+        )
         rows.append(replace(row, gap=largest_gap(twin, build, states)))
-        told((i + 1) / len(BUILDS))
+        told((i + 1) / len(ALL_BUILDS))
     return tuple(rows)
 
 
@@ -110,7 +114,7 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
     """
     states = list[State]()
     for q, v in zip(*random_states(twin, count), strict=True):
-        tried = (sliding(twin, [(q, factor * v)]) for factor in FASTER)
+        tried = (sliding_states(twin, [(q, factor * v)]) for factor in RATE_FACTORS)
         states += next((each for each in tried if each), [])
     if not states:
         said = "dry friction sticks at all states, and MuJoCo's gives way: try `--without friction_loss`"
@@ -118,16 +122,18 @@ def states_of(twin: TwinModel, count: int) -> list[State]:
     return states
 
 
-def softness(twin: TwinModel, count: int) -> float:
+def softness_difference(twin: TwinModel, count: int) -> float:
     """Largest relative difference of the file's accelerations with MuJoCo's soft constraints from those with rigid
     constraints, at states that satisfy the constraints."""
     states = states_of(twin, count)
-    return agreement("", reference(twin, states, PLAIN), moved_at(expected(twin, SOFT), states)).acceleration
+    return agreement_of_build(
+        "", reference_of_file(twin, states, PLAIN_BUILD), moved_at(expected_equations(twin, SOFT_BUILD), states)
+    ).acceleration
 
 
-def reference(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
+def reference_of_file(twin: TwinModel, states: Sequence[State], build: str) -> Reference:
     """``Reference`` for a build from the file's own model at some states; RunFailed as in ``moved_at``."""
-    law = partial(expected, build=build)
+    law = partial(expected_equations, build=build)
     moved = moved_at(law(twin), states)
     return Reference(twin.names, several_at_once(twin.model), moved, sensitivities(twin, law, states, moved))
 
@@ -138,25 +144,33 @@ def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -
     try:
         moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
-        raise RunFailed("twin", SINGULAR) from None
+        raise RunFailed("twin", SINGULAR_MASS_REASON) from None
     if not all(np.isfinite(each.acceleration).all() for each in moved):
         raise RunFailed("twin", "an acceleration is not finite: a number of the file is too large, or a mass too small")
     return moved
 
 
-def agreement(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
+def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -> Agreement:
     """Largest differences between a build and the reference over all states."""
-    rows = [_scales(expected, i) for i in range(len(seen))]
+    rows = [_scales_at_state(expected, i) for i in range(len(seen))]
     own, rounding = (Moved(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
-    apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired(seen, expected.moved)))
+    apart = Moved(*(np.abs(np.array(there) - np.array(here)) for there, here in _paired_values(seen, expected.moved)))
     mass, force, shares = (
-        np.where(d > 0.0, d / np.maximum(np.maximum(a, r / ALIKE), TINY), 0.0)
+        np.where(d > 0.0, d / np.maximum(np.maximum(a, r / EQUAL_ACCELERATION_SHARE), SMALLEST_FLOAT), 0.0)
         for d, a, r in zip(apart, own, rounding, strict=True)
     )
     at, i = np.unravel_index(np.argmax(np.nan_to_num(shares, nan=np.inf)), shares.shape)
     bound = _may_be_rounding(own, rounding.acceleration)
     sizes = (float(apart.acceleration[at, i]), float(np.abs(expected.moved[at].acceleration[i])))
-    return Agreement(build, _largest(mass), _largest(force), _largest(shares), expected.names[i], *sizes, bound)
+    return Agreement(
+        build,
+        _largest_difference(mass),
+        _largest_difference(force),
+        _largest_difference(shares),
+        expected.names[i],
+        *sizes,
+        bound,
+    )
 
 
 def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
@@ -164,34 +178,34 @@ def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
     hardly move are left out."""
     largest, allowed = own.acceleration.max(axis=0), rounding.max(axis=0)
     weighted = largest * np.sqrt(np.diagonal(own.mass, axis1=1, axis2=2).max(axis=0))
-    moves = weighted > HARDLY * weighted.max()
-    return max(ALIKE, float((allowed[moves] / largest[moves]).max(initial=0.0)))
+    moves = weighted > HARDLY_MOVING_SHARE * weighted.max()
+    return max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0)))
 
 
-def _paired(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:
+def _paired_values(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:
     """Pairs of seen and expected values over all states: mass matrices, forces, accelerations."""
     return zip(zip(*seen, strict=True), zip(*expected, strict=True), strict=True)
 
 
-def _largest(shares: np.ndarray) -> float:
+def _largest_difference(shares: np.ndarray) -> float:
     return float(shares.max()) if np.isfinite(shares).all() else np.inf
 
 
-def _scales(expected: Reference, state: int) -> tuple[Moved, Moved]:
+def _scales_at_state(expected: Reference, state: int) -> tuple[Moved, Moved]:
     """Reference magnitudes of masses, forces and accelerations at one state, and the rounding error allowed in each.
 
     The allowed error does not grow further where a mass matrix is nearly singular.
     """
-    moved, sensitive = expected.moved[state], expected.sensitive[state]
+    moved, sensitive = expected.moved[state], expected.sensitivities[state]
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
-    acceleration = np.array([acceleration[together].max() for together in expected.together])
+    acceleration = np.array([acceleration[together].max() for together in expected.judged_together])
     own = Moved(np.outer(inertia, inertia), force, acceleration)
-    allowed = ROUNDING * min(1.0, WORST_CONDITION / _condition(moved.mass))
+    allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
     return own, Moved(*(allowed * each for each in sensitive))
 
 
-def _condition(mass: np.ndarray) -> float:
+def _scaled_condition(mass: np.ndarray) -> float:
     """Condition number of a mass matrix after scaling to a unit diagonal."""
     scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), np.finfo(float).tiny))
     return float(np.linalg.cond(mass * np.outer(scale, scale)))

@@ -9,13 +9,13 @@ from models.multibody.plain.motion import Bodies
 from models.own_model.equalities import tie_rows
 from models.own_model.reading import TwinModel
 
-REDUNDANT = 1e-9
+REDUNDANT_SHARE = 1e-9
 """Share of the largest singular value of the constraints' rows up to which they repeat others."""
-STRIDE = 0.02
+DIFFERENCE_STRIDE = 0.02
 """rad, m: how far all coordinates move together from one row of differences to the next."""
-SLOPES = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
+DIFFERENCE_WEIGHTS = (45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0)
 """Differences of order 6 over one, two and three strides to either side."""
-MET, TRIES, LONGEST = 1e-12, 60, 0.5
+SATISFIED_GAP, MOST_CORRECTIONS, LONGEST_CORRECTION = 1e-12, 60, 0.5
 """m, rad: gap of constraints that are satisfied; steps of Newton's method to get there; m, rad: the longest of them."""
 
 Rows = Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]]
@@ -29,11 +29,11 @@ def plain_constraints(twin: TwinModel) -> PlainConstraints:
     return PlainConstraints(Bodies(driven.vehicle), *tie_rows(driven.couplings, twin.size), joints)
 
 
-def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def constrained_forces(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Forces (n,) including constraint forces, for rigid constraints rows q'' + rest = 0 with rows (c, n) and rest
     (c,); rows may be linearly dependent."""
     turned, sizes, rows = np.linalg.svd(rows, full_matrices=False)
-    kept = sizes > REDUNDANT * sizes[0]
+    kept = sizes > REDUNDANT_SHARE * sizes[0]
     rows, rest = rows[kept], (rest @ turned)[kept] / sizes[kept]
     free, compliance = np.linalg.solve(mass, force), np.linalg.solve(mass, rows.T)
     answer: np.ndarray = force - rows.T @ np.linalg.solve(rows @ compliance, rows @ free + rest)
@@ -42,22 +42,27 @@ def tied(mass: np.ndarray, force: np.ndarray, rows: np.ndarray, rest: np.ndarray
 
 def by_differences(rows_at: Rows, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian J (c, n), and J' q' (c,) by differences of J along the motion, at coordinates and rates (n,)."""
-    stride = STRIDE / max(float(np.abs(v).sum()), 1e-9)
-    steps = [k * stride * v for k in range(1, len(SLOPES) + 1)]
+    stride = DIFFERENCE_STRIDE / max(float(np.abs(v).sum()), 1e-9)
+    steps = [k * stride * v for k in range(1, len(DIFFERENCE_WEIGHTS) + 1)]
     rows, *others = rows_at([q, *(place for s in steps for place in (q + s, q - s))])
-    changes = [weight * (there - back) for weight, there, back in zip(SLOPES, others[::2], others[1::2], strict=True)]
+    changes = [
+        weight * (there - back)
+        for weight, there, back in zip(DIFFERENCE_WEIGHTS, others[::2], others[1::2], strict=True)
+    ]
     rest: np.ndarray = np.sum(changes, axis=0) @ v / stride
     return rows, rest
 
 
-def satisfying(constraints: PlainConstraints, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def satisfying_state(
+    constraints: PlainConstraints, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Nearest coordinates (n,) and rates (n,) that satisfy the constraints, by Newton's method; None if it does not
     converge."""
-    for _ in range(TRIES):
+    for _ in range(MOST_CORRECTIONS):
         gap = constraints.gap(q)
-        inverse = np.linalg.pinv(gap.rows, REDUNDANT)
-        if np.abs(gap.size).max() <= MET:
+        inverse = np.linalg.pinv(gap.rows, REDUNDANT_SHARE)
+        if np.abs(gap.size).max() <= SATISFIED_GAP:
             return q, v - inverse @ (gap.rows @ v)
         step = inverse @ gap.size
-        q = q - step * min(1.0, LONGEST / float(np.abs(step).max()))
+        q = q - step * min(1.0, LONGEST_CORRECTION / float(np.abs(step).max()))
     return None

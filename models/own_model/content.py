@@ -11,16 +11,24 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.own_model.coordinates import BALL, FREE
-from models.own_model.equalities import is_tie, joins
-from models.own_model.names import disabled, label
-from models.own_model.reading import JOINT_TARGETS, affine_law, compensation, is_fixed, is_line, pushes_site, rubs
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
+from models.own_model.equalities import is_tie, joins_bodies
+from models.own_model.names import feature_is_disabled, label
+from models.own_model.reading import (
+    JOINT_TARGETS,
+    affine_law,
+    compensation,
+    has_dry_friction,
+    is_fixed,
+    is_line,
+    pushes_site,
+)
 from models.own_model.xml_guard import Document
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
 PLAIN_ACTUATORS = ("motor", "position", "velocity", "general", "damper")
 STATEFUL_ACTUATORS = ("intvelocity", "cylinder", "muscle", "adhesion", "dcmotor", "pid")
-TAGS = {
+TAGS_OF_ELEMENT = {
     "joint": ("joint", "freejoint"),
     "tendon": ("fixed", "spatial"),
     "body": ("body", "link"),
@@ -31,7 +39,7 @@ TAGS = {
 """Elements of MJCF and URDF that have a name, by what MuJoCo calls the thing."""
 AFFINE_GAINS = (int(GAIN.mjGAIN_FIXED), int(GAIN.mjGAIN_AFFINE))
 AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
-SHOWN = 3
+NAMES_SHOWN = 3
 """Names in a message."""
 
 
@@ -46,23 +54,25 @@ class Content:
 
     def line(self) -> str:
         """One line of text with kind, names and reason."""
-        more = f" and {len(self.names) - SHOWN} more" if len(self.names) > SHOWN else ""
-        return f"{self.kind}: {', '.join(self.names[:SHOWN])}{more}: {self.why}"
+        more = f" and {len(self.names) - NAMES_SHOWN} more" if len(self.names) > NAMES_SHOWN else ""
+        return f"{self.kind}: {', '.join(self.names[:NAMES_SHOWN])}{more}: {self.why}"
 
 
-def contents(model: mujoco.MjModel, document: Document) -> list[Content]:
+def contents_of_model(model: mujoco.MjModel, document: Document) -> list[Content]:
     """All parts of the model beyond a tree with linear laws, one entry for each kind that occurs."""
-    return _rows(model, document, lambda kind, what, number: True)
+    return _contents_of_kind(model, document, lambda kind, what, number: True)
 
 
 def without_equal(model: mujoco.MjModel, document: Document) -> list[Content]:
-    """The entries of ``contents`` that other builds cannot represent."""
-    return _rows(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
+    """The entries of ``contents_of_model`` that other builds cannot represent."""
+    return _contents_of_kind(model, document, lambda kind, what, number: not _has_equal(model, kind, what, number))
 
 
-def _rows(model: mujoco.MjModel, document: Document, wanted: Callable[[str, str, int], bool]) -> list[Content]:
+def _contents_of_kind(
+    model: mujoco.MjModel, document: Document, wanted: Callable[[str, str, int], bool]
+) -> list[Content]:
     rows = list[Content]()
-    for kind, (listed, why, _) in KINDS.items():
+    for kind, (listed, why, _) in CONTENT_KINDS.items():
         if names := [_with_line(model, document, *each) for each in listed(model) if wanted(kind, *each)]:
             rows.append(Content(kind, tuple(names), why))
     return rows
@@ -72,18 +82,18 @@ def _has_equal(model: mujoco.MjModel, kind: str, what: str, number: int) -> bool
     """Whether other builds can represent it: a ball joint without rotor, dry friction of a hinge or slide, or an
     equality constraint between bodies or of one or two hinges or slides."""
     if kind == "friction_loss":
-        return what == "joint" and rubs(model, number)
+        return what == "joint" and has_dry_friction(model, number)
     if kind == "turning_law":
         return not _has_rotor(model, number)
-    return kind == "equality" and (is_tie(model, number) or joins(model, number))
+    return kind == "equality" and (is_tie(model, number) or joins_bodies(model, number))
 
 
 def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Collection[str]) -> list[Content]:
     """Remove the parts named in ``without`` from the model, and return what was removed. InputError where another part
     cannot be represented."""
     for kind in without:
-        if kind not in KINDS:
-            raise InputError("--without", "", kind, "no such content", tuple(KINDS))
+        if kind not in CONTENT_KINDS:
+            raise InputError("--without", "", kind, "no such content", tuple(CONTENT_KINDS))
     there = without_equal(model, document)
     for row in there:
         if row.kind not in without:
@@ -91,39 +101,39 @@ def check_and_leave_out(model: mujoco.MjModel, document: Document, without: Coll
             all_kinds = ",".join(dict.fromkeys((*without, *(each.kind for each in there))))
             more = f"; all that this file needs: `--without {all_kinds}`" if len(there) > 1 else ""
             raise InputError(document.path.name, "", None, f"{row.line()}. It {allowed}{more}")
-    left_out = [row for row in contents(model, document) if row.kind in without]
+    left_out = [row for row in contents_of_model(model, document) if row.kind in without]
     for row in left_out:
-        KINDS[row.kind][2](model)
+        CONTENT_KINDS[row.kind][2](model)
     model.opt.disableflags |= int(DSBL.mjDSBL_LIMIT) | int(DSBL.mjDSBL_AUTORESET) | int(DSBL.mjDSBL_SENSOR)
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # constraints are compared, not their solvers
     model.opt.iterations, model.opt.noslip_iterations = max(100, model.opt.iterations), 0
     model.opt.tolerance = min(1e-8, model.opt.tolerance)
-    if not disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
+    if not feature_is_disabled(model, "REFSAFE"):  # at shorter steps of a path constraints stay as soft
         times = model.eq_solref[:, 0]
         times[:] = np.where(times > 0.0, np.maximum(times, 2.0 * model.opt.timestep), times)
     return left_out
 
 
 def _with_line(model: mujoco.MjModel, document: Document, what: str, number: int) -> str:
-    if number == NAMELESS:
+    if number == NAMELESS_INDEX:
         return what
     name = getattr(model, what)(number).name
-    line = document.line(TAGS.get(what, ()), name) if name else ""
+    line = document.line(TAGS_OF_ELEMENT.get(what, ()), name) if name else ""
     return f"{label(model, what, number)} ({line})" if line else label(model, what, number)
 
 
 Listed = Iterator[tuple[str, int]]
 """What MuJoCo calls a thing, and its number there."""
-NAMELESS = -1
+NAMELESS_INDEX = -1
 
 
-def _touching(model: mujoco.MjModel) -> Listed:
+def _touching_geoms(model: mujoco.MjModel) -> Listed:
     """Geoms that could come into contact with another one, and explicit contact pairs."""
-    if disabled(model, "CONTACT"):
+    if feature_is_disabled(model, "CONTACT"):
         return
     weld, above = model.body_weldid, model.body_weldid[model.body_parentid]
     of = weld[model.geom_bodyid]
-    parents, filtered = above[of], not disabled(model, "FILTERPARENT")
+    parents, filtered = above[of], not feature_is_disabled(model, "FILTERPARENT")
     for g in range(model.ngeom):
         fits = (model.geom_contype[g] & model.geom_conaffinity) | (model.geom_conaffinity[g] & model.geom_contype)
         kin = (of != 0) & (of[g] != 0) & ((parents == of[g]) | (parents[g] == of))
@@ -133,8 +143,8 @@ def _touching(model: mujoco.MjModel) -> Listed:
         yield "pair", p
 
 
-def _rubbing(model: mujoco.MjModel) -> Listed:
-    if disabled(model, "FRICTIONLOSS"):
+def _joints_with_dry_friction(model: mujoco.MjModel) -> Listed:
+    if feature_is_disabled(model, "FRICTIONLOSS"):
         return
     for j in sorted(set(model.dof_jntid[model.dof_frictionloss > 0.0])):
         yield "joint", int(j)
@@ -142,8 +152,8 @@ def _rubbing(model: mujoco.MjModel) -> Listed:
         yield "tendon", int(t)
 
 
-def _equalities(model: mujoco.MjModel) -> Listed:
-    if not disabled(model, "EQUALITY"):
+def _unbuilt_equalities(model: mujoco.MjModel) -> Listed:
+    if not feature_is_disabled(model, "EQUALITY"):
         for e in np.flatnonzero(model.eq_active0):
             yield "equality", int(e)
 
@@ -153,7 +163,7 @@ def _odd_actuators(model: mujoco.MjModel) -> Listed:
     for i in range(model.nu):
         target = int(model.actuator_trnid[i, 0])
         kind = int(model.actuator_trntype[i])
-        along_joint = kind in JOINT_TARGETS and int(model.jnt_type[target]) not in (BALL, FREE)
+        along_joint = kind in JOINT_TARGETS and int(model.jnt_type[target]) not in (BALL_JOINT, FREE_JOINT)
         along_tendon = kind == TRN.mjTRN_TENDON and is_fixed(model, target)
         on_site = pushes_site(model, i) and not any(affine_law(model, i, control)[2] for control in (0.0, 1.0))
         straight = int(model.actuator_gaintype[i]) in AFFINE_GAINS and int(model.actuator_biastype[i]) in AFFINE_BIASES
@@ -163,7 +173,7 @@ def _odd_actuators(model: mujoco.MjModel) -> Listed:
             yield "actuator", i
 
 
-def _bounded(model: mujoco.MjModel) -> Listed:
+def _limited_elements(model: mujoco.MjModel) -> Listed:
     if not model.nu:
         return
     for i in np.flatnonzero(model.actuator_forcelimited):
@@ -185,15 +195,15 @@ def _spatial_tendons(model: mujoco.MjModel) -> Listed:
 
 def _turning_laws(model: mujoco.MjModel) -> Listed:
     """Joints with springs, dampers or rotors that act about all three axes at once."""
-    for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
-        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
+    for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
+        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
         if model.jnt_stiffness[j] or model.dof_damping[first] or _has_rotor(model, int(j)):
             yield "joint", int(j)
 
 
 def _has_rotor(model: mujoco.MjModel, joint: int) -> bool:
     """Whether a ball joint has an armature."""
-    return bool(model.jnt_type[joint] == BALL and model.dof_armature[model.jnt_dofadr[joint]])
+    return bool(model.jnt_type[joint] == BALL_JOINT and model.dof_armature[model.jnt_dofadr[joint]])
 
 
 def _bent_laws(model: mujoco.MjModel) -> Listed:
@@ -213,12 +223,12 @@ def _half_lifted(model: mujoco.MjModel) -> Listed:
             yield "body", b
 
 
-def _medium(model: mujoco.MjModel) -> Listed:
+def _medium_elements(model: mujoco.MjModel) -> Listed:
     if model.opt.density or model.opt.viscosity:
-        yield "density and viscosity", NAMELESS
+        yield "density and viscosity", NAMELESS_INDEX
 
 
-def _flexes(model: mujoco.MjModel) -> Listed:
+def _flexible_elements(model: mujoco.MjModel) -> Listed:
     for i in range(model.nflex):
         yield "flex", i
 
@@ -254,10 +264,10 @@ def _forget_tendons(model: mujoco.MjModel) -> None:
 
 
 def _forget_turning(model: mujoco.MjModel) -> None:
-    for j in np.flatnonzero((model.jnt_type == BALL) | (model.jnt_type == FREE)):
-        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE else 0)
+    for j in np.flatnonzero((model.jnt_type == BALL_JOINT) | (model.jnt_type == FREE_JOINT)):
+        first = int(model.jnt_dofadr[j]) + (3 if model.jnt_type[j] == FREE_JOINT else 0)
         model.dof_damping[first : first + 3] = model.jnt_stiffness[j] = 0.0
-        if model.jnt_type[j] == BALL:
+        if model.jnt_type[j] == BALL_JOINT:
             model.dof_armature[first : first + 3] = 0.0
 
 
@@ -280,15 +290,15 @@ def _keep_flexes(model: mujoco.MjModel) -> None:
     raise InputError("", "flex", None, "deformable bodies cannot be left out: their vertices are bodies of the model")
 
 
-KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
-    "contact": (_touching, "bodies that may touch", _forget_contacts),
+CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco.MjModel], None]]] = {
+    "contact": (_touching_geoms, "bodies that may touch", _forget_contacts),
     "friction_loss": (
-        _rubbing,
+        _joints_with_dry_friction,
         "dry friction, a soft constraint in MuJoCo, is built for hinges and slides alone",
         _forget_rubbing,
     ),
     "equality": (
-        _equalities,
+        _unbuilt_equalities,
         "a soft constraint in MuJoCo, which is built between points of bodies, and for joints that follow another in "
         "proportion",
         _forget_equalities,
@@ -299,7 +309,7 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
         "site that it does not damp",
         _forget_actuators,
     ),
-    "force_range": (_bounded, "a force that is cut off at a bound", _forget_bounds),
+    "force_range": (_limited_elements, "a force that is cut off at a bound", _forget_bounds),
     "tendon": (
         _spatial_tendons,
         "a spring around bodies or with slack, or a rotor along a way in space",
@@ -312,13 +322,13 @@ KINDS: dict[str, tuple[Callable[[mujoco.MjModel], Listed], str, Callable[[mujoco
         "weight that is compensated at some joints alone, since others leave that to actuators, which are off",
         _forget_lifting,
     ),
-    "fluid": (_medium, "forces of a medium", _forget_medium),
-    "flex": (_flexes, "a deformable body", _keep_flexes),
+    "fluid": (_medium_elements, "forces of a medium", _forget_medium),
+    "flex": (_flexible_elements, "a deformable body", _keep_flexes),
 }
 """Kinds of content without an equal: what of it a model has, why it has none, and how it is left out."""
 
 
-def ranges(model: mujoco.MjModel) -> list[str]:
+def limits_switched_off(model: mujoco.MjModel) -> list[str]:
     """Joints and tendons whose limits were switched off."""
     joints = [label(model, "joint", int(j)) for j in np.flatnonzero(model.jnt_limited)]
     return joints + [label(model, "tendon", int(t)) for t in np.flatnonzero(model.tendon_limited)]

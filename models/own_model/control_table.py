@@ -14,15 +14,15 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table
-from models.own_model.reading import TwinModel, affine_law, controls, described
+from models.own_model.reading import TwinModel, affine_law, constant_controls, described_model
 
-UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
+CONTROL_UNITS = dict.fromkeys(("-", "N", "N m", "m", "rad", "m/s", "rad/s"), 1.0)
 """Units that a control may have: SI, as MuJoCo takes it."""
 ON_STEP = 1e-6
 """Share of a step by which a row's time may miss it."""
 
 
-class Leg(NamedTuple):
+class PathSection(NamedTuple):
     """A section of a path with constant controls (nu,), ``steps`` long; ``twin`` contains their forces as constants of
     its actuators."""
 
@@ -39,7 +39,7 @@ class ControlTable:
     times: np.ndarray
     values: np.ndarray
 
-    def legs(self, twin: TwinModel, steps: int, step: float) -> list[Leg]:
+    def path_sections(self, twin: TwinModel, steps: int, step: float) -> list[PathSection]:
         """Sections of a path of ``steps`` steps of ``step`` seconds; InputError where a row's time lies between two
         steps."""
         first = self.times / step
@@ -49,12 +49,12 @@ class ControlTable:
             raise InputError(self.path, f"row {off[0] + 1}, column 'time'", time, allowed)
         ends = [*np.round(first).astype(int).tolist(), steps]
         counts = [min(end, steps) - start for start, end in pairwise(ends) if start < steps]
-        return [Leg(held_at(twin, row), count, row) for row, count in zip(self.values, counts, strict=False)]
+        return [PathSection(held_at(twin, row), count, row) for row, count in zip(self.values, counts, strict=False)]
 
 
-def constant_leg(twin: TwinModel, steps: int) -> list[Leg]:
+def constant_leg(twin: TwinModel, steps: int) -> list[PathSection]:
     """The whole path as one section with the model's constant controls."""
-    return [Leg(twin, steps, controls(twin.model))]
+    return [PathSection(twin, steps, constant_controls(twin.model))]
 
 
 def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
@@ -68,7 +68,7 @@ def read_controls(path: Path, model: mujoco.MjModel) -> ControlTable:
         raise InputError("--controls", "", str(path), "the model has no actuators")
     if len({"time", *names}) <= len(names):
         raise InputError("--controls", "", str(path), "columns would share a name: rename the model's actuators")
-    table = read_table(path, {"time": SECONDS, **dict.fromkeys(names, UNITS)}, increasing="time")
+    table = read_table(path, {"time": SECONDS, **dict.fromkeys(names, CONTROL_UNITS)}, increasing="time")
     if table["time"][0] != 0.0:
         raise InputError(path, "row 1, column 'time'", float(table["time"][0]), "the first row must be of time 0")
     for i, name in enumerate(names):
@@ -87,4 +87,4 @@ def held_at(twin: TwinModel, constant: np.ndarray) -> TwinModel:
         model.actuator_biasprm[i, :3] = affine_law(twin.model, i, float(constant[i]))
         model.actuator_gainprm[i, :3] = 0.0
         model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
-    return described(model, twin.name)
+    return described_model(model, twin.name)

@@ -12,7 +12,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-SLIDE, BALL, FREE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "BALL", "FREE"))
+SLIDE_JOINT, BALL_JOINT, FREE_JOINT = (
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("SLIDE", "BALL", "FREE")
+)
 
 
 class MujocoState(NamedTuple):
@@ -33,7 +35,7 @@ class Turning:
 
     first: int
     place: int
-    design: np.ndarray
+    design_axes: np.ndarray
     free: bool
 
 
@@ -49,10 +51,10 @@ class Coordinates:
         for j in range(model.njnt):
             kind, place, first = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
             axes = design.xmat[model.jnt_bodyid[j]].reshape(3, 3).copy()
-            if kind == FREE:
+            if kind == FREE_JOINT:
                 self._plain += [(first + i, place + i) for i in range(3)]
                 self.turnings.append(Turning(first + 3, place + 3, axes, True))
-            elif kind == BALL:
+            elif kind == BALL_JOINT:
                 self.turnings.append(Turning(first, place, axes, False))
             else:
                 self._plain.append((first, place))
@@ -71,10 +73,14 @@ class Coordinates:
             qpos[place] += q[coordinate]
         for turning in self.turnings:
             at = slice(turning.first, turning.first + 3)
-            rotation, rates, bias = turned(q[at], v[at])
-            lies = rotation @ turning.design if turning.free else turning.design.T @ rotation @ turning.design
+            rotation, rates, bias = turned_by_angles(q[at], v[at])
+            lies = (
+                rotation @ turning.design_axes
+                if turning.free
+                else turning.design_axes.T @ rotation @ turning.design_axes
+            )
             mujoco.mju_mat2Quat(qpos[turning.place : turning.place + 4], np.ascontiguousarray(lies).ravel())
-            jacobian[at, at], rest[at] = turning.design.T @ rates, turning.design.T @ bias
+            jacobian[at, at], rest[at] = turning.design_axes.T @ rates, turning.design_axes.T @ bias
         return MujocoState(qpos, jacobian @ v, jacobian, rest)
 
 
@@ -84,12 +90,12 @@ def several_at_once(model: mujoco.MjModel) -> tuple[slice, ...]:
     groups = list[slice]()
     for j in range(model.njnt):
         first = int(model.jnt_dofadr[j])
-        starts = {FREE: (first, first + 3), BALL: (first,)}.get(int(model.jnt_type[j]), ())
+        starts = {FREE_JOINT: (first, first + 3), BALL_JOINT: (first,)}.get(int(model.jnt_type[j]), ())
         groups += [slice(start, start + 3) for start in starts for _ in range(3)] or [slice(first, first + 1)]
     return tuple(groups)
 
 
-def turned(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turned_by_angles(angles: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rotation matrix R = Rx Ry Rz (3, 3), G (3, 3) with the angular velocity G rates in the rotated axes, and G' rates
     (3,)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(angles), np.cos(angles)

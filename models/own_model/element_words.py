@@ -9,13 +9,13 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from models.own_model.coordinates import SLIDE
-from models.own_model.equalities import by_sites, is_tie, joins
-from models.own_model.names import disabled, label
+from models.own_model.coordinates import SLIDE_JOINT
+from models.own_model.equalities import by_sites, is_tie, joins_bodies
+from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import (
     JOINT_TARGETS,
     LAST_GROUP,
-    acts,
+    actuator_is_on,
     is_fixed,
     is_line,
     pushes_site,
@@ -23,18 +23,18 @@ from models.own_model.reading import (
     tendon_travel,
 )
 
-HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-WORLD = "the world"
-OFF = "off"
+HINGE_JOINT = int(mujoco.mjtJoint.mjJNT_HINGE)
+WORLD_BODY = "the world"
+SWITCHED_OFF = "off"
 Reader = Callable[[mujoco.MjModel, int], np.ndarray]
 Writer = Callable[[mujoco.MjModel, int, np.ndarray], None]
 
 
-def _word(text: str) -> np.ndarray:
+def _word_value(text: str) -> np.ndarray:
     return np.array([text])
 
 
-def _refused(what: str) -> Writer:
+def _refusing_writer(what: str) -> Writer:
     """A writer that raises ValueError, for properties that belong to the structure of the tree."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
@@ -43,7 +43,7 @@ def _refused(what: str) -> Writer:
     return write
 
 
-def _numbered(model: mujoco.MjModel, sort: str, owner: str) -> int:
+def _index_of_name(model: mujoco.MjModel, sort: str, owner: str) -> int:
     """Index of the joint, body or tendon with the name that ``label`` gives; ValueError if there is none."""
     count = {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon}[sort]
     for number in range(count):
@@ -52,24 +52,24 @@ def _numbered(model: mujoco.MjModel, sort: str, owner: str) -> int:
     raise ValueError(f"no {owner}")
 
 
-def _switch(flag: str) -> tuple[Reader, Writer]:
+def _feature_switch(flag: str) -> tuple[Reader, Writer]:
     """Reader and writer of a switch by which a file turns off a feature of MuJoCo."""
     bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
 
     def write(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
-        off = value[0] == OFF
+        off = value[0] == SWITCHED_OFF
         model.opt.disableflags = (model.opt.disableflags & ~bit) | (bit if off else 0)
 
-    return lambda model, _: _word(OFF if disabled(model, flag) else "on"), write
+    return lambda model, _: _word_value(SWITCHED_OFF if feature_is_disabled(model, flag) else "on"), write
 
 
 def _read_acts(model: mujoco.MjModel, i: int) -> np.ndarray:
     """Whether an actuator acts, or belongs to a group that is switched off."""
-    return _word("on" if acts(model, i) else OFF)
+    return _word_value("on" if actuator_is_on(model, i) else SWITCHED_OFF)
 
 
 def _write_acts(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
-    off = value[0] == OFF
+    off = value[0] == SWITCHED_OFF
     free = next((g for g in range(LAST_GROUP) if not model.opt.disableactuator & (1 << g)), None)
     if not off and free is None:
         raise ValueError("all groups are off")
@@ -79,11 +79,11 @@ def _write_acts(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
 
 
 def _read_type(model: mujoco.MjModel, j: int) -> np.ndarray:
-    return _word(mujoco.mjtJoint(int(model.jnt_type[j])).name.removeprefix("mjJNT_").lower())
+    return _word_value(mujoco.mjtJoint(int(model.jnt_type[j])).name.removeprefix("mjJNT_").lower())
 
 
 def _write_type(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
-    kinds = {"hinge": HINGE, "slide": SLIDE}
+    kinds = {"hinge": HINGE_JOINT, "slide": SLIDE_JOINT}
     if value[0] not in kinds or int(model.jnt_type[j]) not in kinds.values():
         raise ValueError("ball and free joints have other coordinates")
     model.jnt_type[j] = kinds[value[0]]
@@ -93,7 +93,7 @@ def _read_parent(model: mujoco.MjModel, j: int) -> np.ndarray:
     """The joint before a joint on the path from the world."""
     body = int(model.jnt_bodyid[j])
     if j > model.body_jntadr[body]:
-        return _word(label(model, "joint", j - 1))
+        return _word_value(label(model, "joint", j - 1))
     return _moved_by(model, int(model.body_parentid[body]))
 
 
@@ -102,15 +102,15 @@ def _moved_by(model: mujoco.MjModel, body: int) -> np.ndarray:
     while body and not model.body_jntnum[body]:
         body = int(model.body_parentid[body])
     last = int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
-    return _word(label(model, "joint", last) if body else WORLD)
+    return _word_value(label(model, "joint", last) if body else WORLD_BODY)
 
 
 def _read_held(model: mujoco.MjModel, t: int) -> np.ndarray:
     """Joints of a fixed tendon, or bodies at both ends of a straight one."""
     if is_fixed(model, t):
-        return _word(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
+        return _word_value(", ".join(label(model, "joint", j) for j in tendon_travel(model, t)[0]))
     if is_line(model, t):
-        return _word(", ".join(_body_of(model, site) for site in sites_of(model, t)))
+        return _word_value(", ".join(_body_of(model, site) for site in sites_of(model, t)))
     return np.zeros(0)
 
 
@@ -118,41 +118,43 @@ def _write_held(model: mujoco.MjModel, t: int, value: np.ndarray) -> None:
     names, first = value[0].split(", "), int(model.tendon_adr[t])
     if not is_fixed(model, t) or len(names) != model.tendon_num[t]:
         raise ValueError("a tendon of another kind, or of another number of joints")
-    model.wrap_objid[first : first + len(names)] = [_numbered(model, "joint", name) for name in names]
+    model.wrap_objid[first : first + len(names)] = [_index_of_name(model, "joint", name) for name in names]
 
 
 def _body_of(model: mujoco.MjModel, site: int) -> str:
     body = int(model.site_bodyid[site])
-    return label(model, "body", body) if body else WORLD
+    return label(model, "body", body) if body else WORLD_BODY
 
 
 def _read_target(model: mujoco.MjModel, i: int) -> np.ndarray:
     """What an actuator drives: a joint, a tendon, the body of a site."""
     target = int(model.actuator_trnid[i, 0])
     if pushes_site(model, i):
-        return _word(f"a site of {_body_of(model, target)}")
+        return _word_value(f"a site of {_body_of(model, target)}")
     if int(model.actuator_trntype[i]) in JOINT_TARGETS:
-        return _word(label(model, "joint", target))
+        return _word_value(label(model, "joint", target))
     tendon = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON
-    return _word(label(model, "tendon", target)) if tendon else np.zeros(0)
+    return _word_value(label(model, "tendon", target)) if tendon else np.zeros(0)
 
 
 def _write_target(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     kind, there = value[0].split(" ")[0], _read_target(model, i)[0].split(" ")[0]
     if kind != there or kind == "a":
         raise ValueError("a target of another kind")
-    model.actuator_trnid[i, 0] = _numbered(model, kind, value[0])
+    model.actuator_trnid[i, 0] = _index_of_name(model, kind, value[0])
 
 
 def _read_between(model: mujoco.MjModel, e: int) -> np.ndarray:
     """Joints or bodies that an equality constraint connects."""
     things = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
     if is_tie(model, e):
-        return _word(" and ".join(label(model, "joint", j) for j in things if j >= 0))
-    if not joins(model, e):
+        return _word_value(" and ".join(label(model, "joint", j) for j in things if j >= 0))
+    if not joins_bodies(model, e):
         return np.zeros(0)
-    bodies = [_body_of(model, s) if by_sites(model, e) else label(model, "body", s) if s else WORLD for s in things]
-    return _word(" and ".join(bodies))
+    bodies = [
+        _body_of(model, s) if by_sites(model, e) else label(model, "body", s) if s else WORLD_BODY for s in things
+    ]
+    return _word_value(" and ".join(bodies))
 
 
 def _write_between(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
@@ -160,20 +162,20 @@ def _write_between(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
     before = _read_between(model, e)[0].split(" and ")
     if len(names) != len(before) or by_sites(model, e) or not all(name.startswith(sort) for name in names):
         raise ValueError("a constraint of another kind")
-    numbers = [_numbered(model, sort, name) for name in names]
+    numbers = [_index_of_name(model, sort, name) for name in names]
     model.eq_obj1id[e], model.eq_obj2id[e] = (*numbers, -1)[:2]
 
 
-WORDS: tuple[tuple[str, str, Reader, Writer], ...] = (
-    ("model", "springs", *_switch("SPRING")),
-    ("model", "dampers", *_switch("DAMPER")),
-    ("model", "actuators", *_switch("ACTUATION")),
-    ("model", "equality constraints", *_switch("EQUALITY")),
-    ("model", "dry friction", *_switch("FRICTIONLOSS")),
+WORD_ELEMENTS: tuple[tuple[str, str, Reader, Writer], ...] = (
+    ("model", "springs", *_feature_switch("SPRING")),
+    ("model", "dampers", *_feature_switch("DAMPER")),
+    ("model", "actuators", *_feature_switch("ACTUATION")),
+    ("model", "equality constraints", *_feature_switch("EQUALITY")),
+    ("model", "dry friction", *_feature_switch("FRICTIONLOSS")),
     ("actuator", "switch", _read_acts, _write_acts),
     ("joint", "type", _read_type, _write_type),
-    ("joint", "parent", _read_parent, _refused("the joint before a joint")),
-    ("body", "supporting joint", _moved_by, _refused("the joint that moves a body")),
+    ("joint", "parent", _read_parent, _refusing_writer("the joint before a joint")),
+    ("body", "supporting joint", _moved_by, _refusing_writer("the joint that moves a body")),
     ("tendon", "attachment", _read_held, _write_held),
     ("actuator", "target", _read_target, _write_target),
     ("equality", "partners", _read_between, _write_between),

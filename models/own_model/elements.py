@@ -10,17 +10,17 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from models.own_model.coordinates import BALL, FREE, SLIDE
-from models.own_model.element_words import WORDS
-from models.own_model.equalities import CONNECT, by_sites, is_tie, joins
-from models.own_model.names import disabled, label
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
+from models.own_model.element_words import WORD_ELEMENTS
+from models.own_model.equalities import CONNECT_EQUALITY, by_sites, is_tie, joins_bodies
+from models.own_model.names import feature_is_disabled, label
 from models.own_model.reading import is_line, pushes_site, sites_of
 
-AFFINE, PLAIN = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
+AFFINE_LAW, CONSTANT_LAW = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
 """Laws of actuators, whose numbers are the same for gain and bias."""
-SAME = 1e-12
+EQUALITY_TOLERANCE = 1e-12
 """Relative difference up to which two values of an element are equal."""
-DIGITS, EXACT = 6, 17
+SHOWN_DIGITS, EXACT_DIGITS = 6, 17
 """Digits in which values are shown, and those in which every two numbers differ."""
 
 
@@ -39,23 +39,23 @@ class Element:
         return self.kind, self.owner
 
     @property
-    def says(self) -> bool:
+    def is_nonzero(self) -> bool:
         """Whether the value is not zero."""
-        return says(self.value)
+        return value_is_nonzero(self.value)
 
     @property
     def text(self) -> str:
         """The value with its unit as text."""
-        return shown(self.value, self.unit)
+        return value_text(self.value, self.unit)
 
-    def same(self, other: "Element") -> bool:
+    def has_same_value(self, other: "Element") -> bool:
         """Whether both have the same value."""
         if is_word(self.value) or is_word(other.value):
             return bool(np.array_equal(self.value, other.value))
         if self.value.shape != other.value.shape:
             return False
         size = max(np.abs(self.value).max(initial=0.0), np.abs(other.value).max(initial=0.0))
-        return bool(np.abs(self.value - other.value).max(initial=0.0) <= SAME * size)
+        return bool(np.abs(self.value - other.value).max(initial=0.0) <= EQUALITY_TOLERANCE * size)
 
 
 def is_word(value: np.ndarray) -> bool:
@@ -63,14 +63,14 @@ def is_word(value: np.ndarray) -> bool:
     return value.dtype.kind == "U"
 
 
-def says(value: np.ndarray) -> bool:
+def value_is_nonzero(value: np.ndarray) -> bool:
     """Whether a value is a word or contains a number other than zero."""
     return is_word(value) or bool(value.any())
 
 
-def shown(value: np.ndarray, unit: str = "", digits: int = DIGITS) -> str:
+def value_text(value: np.ndarray, unit: str = "", digits: int = SHOWN_DIGITS) -> str:
     """A value with its unit as text; "none" for zeros or an empty value."""
-    if not says(value):
+    if not value_is_nonzero(value):
         return "none"
     if is_word(value):
         return ", ".join(value)
@@ -81,15 +81,15 @@ def shown(value: np.ndarray, unit: str = "", digits: int = DIGITS) -> str:
 
 def told_apart(first: np.ndarray, second: np.ndarray, unit: str) -> tuple[str, str]:
     """Two different values as text, with as few digits as show the difference."""
-    texts = shown(first, unit), shown(second, unit)
-    for digits in range(DIGITS + 1, EXACT + 1):
+    texts = value_text(first, unit), value_text(second, unit)
+    for digits in range(SHOWN_DIGITS + 1, EXACT_DIGITS + 1):
         if texts[0] != texts[1]:
             break
-        texts = shown(first, unit, digits), shown(second, unit, digits)
+        texts = value_text(first, unit, digits), value_text(second, unit, digits)
     return texts
 
 
-def short(number: float) -> str:
+def two_digit_text(number: float) -> str:
     """A relative difference as text with two digits; "0" for zero."""
     return f"{number:.1e}" if number else "0"
 
@@ -105,15 +105,15 @@ class _Kind:
     write: Callable[[mujoco.MjModel, int, np.ndarray], None]
 
 
-def elements(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
+def elements_of_model(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
     """All elements of a model, in the order of the model."""
-    return {each.key: each for each in _listed(model)}
+    return {each.key: each for each in _elements_of_kind(model)}
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
     """Write a value of an element into a model for ``described``; KeyError if the model has no such element, ValueError
     if the element cannot have this value."""
-    kind, number = _place(model, key)
+    kind, number = _kind_and_index(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")
     kind.write(model, number, value)
@@ -122,51 +122,51 @@ def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
 
 def drop(model: mujoco.MjModel, key: tuple[str, str]) -> bool:
     """Set an element to zero in a model, if its kind allows this; returns whether it does."""
-    kind, number = _place(model, key)
-    if kind.kind not in DROPPED:
+    kind, number = _kind_and_index(model, key)
+    if kind.kind not in REMOVABLE_KINDS:
         return False
     kind.write(model, number, np.zeros_like(kind.read(model, number)))
     return True
 
 
-def _listed(model: mujoco.MjModel) -> Iterator[Element]:
-    for kind in KINDS:
-        for number in range(_count(model, kind.sort)):
+def _elements_of_kind(model: mujoco.MjModel) -> Iterator[Element]:
+    for kind in ELEMENT_KINDS:
+        for number in range(_count_of_sort(model, kind.sort)):
             value = np.atleast_1d(kind.read(model, number))
             if value.size:
-                yield Element(kind.kind, _owner(model, kind, number), _unit(model, kind, number), value)
+                yield Element(kind.kind, _owner_name(model, kind, number), _unit(model, kind, number), value)
 
 
-def _place(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
-    for kind in KINDS:
+def _kind_and_index(model: mujoco.MjModel, key: tuple[str, str]) -> tuple[_Kind, int]:
+    for kind in ELEMENT_KINDS:
         if kind.kind == key[0]:
-            for number in range(_count(model, kind.sort)):
-                if _owner(model, kind, number) == key[1]:
+            for number in range(_count_of_sort(model, kind.sort)):
+                if _owner_name(model, kind, number) == key[1]:
                     return kind, number
     raise KeyError(key)
 
 
-def _count(model: mujoco.MjModel, sort: str) -> int:
+def _count_of_sort(model: mujoco.MjModel, sort: str) -> int:
     counts = {"joint": model.njnt, "body": model.nbody, "tendon": model.ntendon, "actuator": model.nu}
     return {**counts, "equality": model.neq, "model": 1}[sort]
 
 
-def _owner(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
+def _owner_name(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
     return "the model" if kind.sort == "model" else label(model, kind.sort, number)
 
 
 def _unit(model: mujoco.MjModel, kind: _Kind, number: int) -> str:
     """The unit for this part, where one exists for rotation and one for translation."""
     turning, _, shifting = kind.unit.partition(" | ")
-    slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE, FREE)
+    slides = kind.sort == "joint" and model.jnt_type[number] in (SLIDE_JOINT, FREE_JOINT)
     return shifting if shifting and slides else turning
 
 
-def _body(field: str) -> tuple[Callable, Callable]:
-    return _field(field, lambda model, b: b)
+def _body_accessors(field: str) -> tuple[Callable, Callable]:
+    return _number_accessors(field, lambda model, b: b)
 
 
-def _field(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
+def _number_accessors(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Callable, Callable]:
     """Reader and writer of numbers of a compiled model."""
 
     def write(model: mujoco.MjModel, number: int, value: np.ndarray) -> None:
@@ -177,7 +177,7 @@ def _field(field: str, at: Callable[[mujoco.MjModel, int], object]) -> tuple[Cal
 
 
 def _of_joint(field: str) -> tuple[Callable, Callable]:
-    return _field(field, lambda model, j: j)
+    return _number_accessors(field, lambda model, j: j)
 
 
 def _of_freedoms(field: str) -> tuple[Callable, Callable]:
@@ -185,15 +185,15 @@ def _of_freedoms(field: str) -> tuple[Callable, Callable]:
 
     def places(model: mujoco.MjModel, j: int) -> slice:
         first = int(model.jnt_dofadr[j])
-        return slice(first, first + {FREE: 6, BALL: 3}.get(int(model.jnt_type[j]), 1))
+        return slice(first, first + {FREE_JOINT: 6, BALL_JOINT: 3}.get(int(model.jnt_type[j]), 1))
 
-    return _field(field, places)
+    return _number_accessors(field, places)
 
 
 def _read_spring(model: mujoco.MjModel, j: int) -> np.ndarray:
     """Rest position of a joint's spring relative to the design position; empty if there is no spring."""
     at = int(model.jnt_qposadr[j])
-    several = int(model.jnt_type[j]) in (BALL, FREE)
+    several = int(model.jnt_type[j]) in (BALL_JOINT, FREE_JOINT)
     return np.zeros(0) if several or not model.jnt_stiffness[j] else model.qpos_spring[at : at + 1] - model.qpos0[at]
 
 
@@ -206,7 +206,7 @@ def _write_spring(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 def _read_zero(model: mujoco.MjModel, j: int) -> np.ndarray:
     """The joint coordinate that the file assigns to the design position of a hinge or slide."""
     at = int(model.jnt_qposadr[j])
-    return np.zeros(0) if int(model.jnt_type[j]) in (BALL, FREE) else model.qpos0[at : at + 1].copy()
+    return np.zeros(0) if int(model.jnt_type[j]) in (BALL_JOINT, FREE_JOINT) else model.qpos0[at : at + 1].copy()
 
 
 def _write_zero(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
@@ -216,7 +216,7 @@ def _write_zero(model: mujoco.MjModel, j: int, value: np.ndarray) -> None:
 
 
 def _read_axis(model: mujoco.MjModel, j: int) -> np.ndarray:
-    return np.zeros(0) if int(model.jnt_type[j]) in (BALL, FREE) else model.jnt_axis[j].copy()
+    return np.zeros(0) if int(model.jnt_type[j]) in (BALL_JOINT, FREE_JOINT) else model.jnt_axis[j].copy()
 
 
 def _read_inertia(model: mujoco.MjModel, b: int) -> np.ndarray:
@@ -242,7 +242,7 @@ def _write_inertia(model: mujoco.MjModel, b: int, value: np.ndarray) -> None:
 
 
 def _read_gravity(model: mujoco.MjModel, _: int) -> np.ndarray:
-    return np.zeros(3) if disabled(model, "GRAVITY") else np.array(model.opt.gravity)
+    return np.zeros(3) if feature_is_disabled(model, "GRAVITY") else np.array(model.opt.gravity)
 
 
 def _write_gravity(model: mujoco.MjModel, _: int, value: np.ndarray) -> None:
@@ -259,9 +259,9 @@ def _write_gear(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     model.actuator_gear[i, : value.size] = value
 
 
-def _within(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
+def _range_accessors(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
     """Reader and writer of a range, given as zeros where the range is not limited."""
-    read, write = _field(range_field, lambda model, i: i)
+    read, write = _number_accessors(range_field, lambda model, i: i)
 
     def read_limited(model: mujoco.MjModel, i: int) -> np.ndarray:
         return read(model, i) * float(getattr(model, limited_field)[i])
@@ -273,17 +273,17 @@ def _within(range_field: str, limited_field: str) -> tuple[Callable, Callable]:
     return read_limited, write_limited
 
 
-def _law(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
+def _actuator_law_accessors(numbers: str, kinds: str, first: int) -> tuple[Callable, Callable]:
     """Reader and writer of an actuator's three numbers of gain or bias. Numbers from index ``first`` on count only for
     an affine law."""
 
     def read(model: mujoco.MjModel, i: int) -> np.ndarray:
         law = np.array(getattr(model, numbers)[i, :3])
-        law[first:] *= getattr(model, kinds)[i] == AFFINE
+        law[first:] *= getattr(model, kinds)[i] == AFFINE_LAW
         return law
 
     def write(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
-        getattr(model, kinds)[i] = AFFINE if value[first:].any() else PLAIN
+        getattr(model, kinds)[i] = AFFINE_LAW if value[first:].any() else CONSTANT_LAW
         getattr(model, numbers)[i, :3] = value
 
     return read, write
@@ -293,7 +293,7 @@ def _coefficients() -> tuple[Callable, Callable]:
     def places(model: mujoco.MjModel, t: int) -> slice:
         return slice(int(model.tendon_adr[t]), int(model.tendon_adr[t] + model.tendon_num[t]))
 
-    return _field("wrap_prm", places)
+    return _number_accessors("wrap_prm", places)
 
 
 def _read_ends(model: mujoco.MjModel, t: int) -> np.ndarray:
@@ -317,13 +317,13 @@ def _write_tie(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 def _read_joint(model: mujoco.MjModel, e: int) -> np.ndarray:
     """Numbers of a constraint between bodies: 1 if it is active, and the positions of both ends; zeros if it is not."""
-    if not joins(model, e):
+    if not joins_bodies(model, e):
         return np.zeros(0)
     if by_sites(model, e):
         sites = [model.eq_obj1id[e], model.eq_obj2id[e]]
         ends = np.concatenate((model.site_pos[sites].ravel(), model.site_quat[sites].ravel()))
     else:
-        ends = model.eq_data[e, : 6 if model.eq_type[e] == CONNECT else 10]
+        ends = model.eq_data[e, : 6 if model.eq_type[e] == CONNECT_EQUALITY else 10]
     return np.array([1.0, *ends]) * model.eq_active0[e]
 
 
@@ -341,7 +341,7 @@ def _write_joint(model: mujoco.MjModel, e: int, value: np.ndarray) -> None:
 
 def _read_softness(model: mujoco.MjModel, e: int) -> np.ndarray:
     """solref and solimp of a constraint."""
-    built = is_tie(model, e) or joins(model, e)
+    built = is_tie(model, e) or joins_bodies(model, e)
     return np.concatenate((model.eq_solref[e], model.eq_solimp[e])) if built else np.zeros(0)
 
 
@@ -360,14 +360,14 @@ def _write_site(model: mujoco.MjModel, i: int, value: np.ndarray) -> None:
     model.site_pos[site], model.site_quat[site], model.site_sameframe[site] = value[:3], value[3:], 0
 
 
-KINDS = (
+ELEMENT_KINDS = (
     _Kind("model", "gravity", "m/s^2", _read_gravity, _write_gravity),
-    _Kind("body", "mass", "kg", *_body("body_mass")),
-    _Kind("body", "centre of mass", "m", *_body("body_ipos")),
+    _Kind("body", "mass", "kg", *_body_accessors("body_mass")),
+    _Kind("body", "centre of mass", "m", *_body_accessors("body_ipos")),
     _Kind("body", "inertia", "kg m^2", _read_inertia, _write_inertia),
-    _Kind("body", "place", "m", *_body("body_pos")),
-    _Kind("body", "orientation", "quaternion", *_body("body_quat")),
-    _Kind("body", "gravity compensation", "", *_body("body_gravcomp")),
+    _Kind("body", "place", "m", *_body_accessors("body_pos")),
+    _Kind("body", "orientation", "quaternion", *_body_accessors("body_quat")),
+    _Kind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
     _Kind("joint", "axis", "", _read_axis, _of_joint("jnt_axis")[1]),
     _Kind("joint", "anchor", "m", *_of_joint("jnt_pos")),
     _Kind("joint", "zero", "rad | m", _read_zero, _write_zero),
@@ -376,24 +376,24 @@ KINDS = (
     _Kind("joint", "damping", "N m s/rad | N s/m", *_of_freedoms("dof_damping")),
     _Kind("joint", "armature", "kg m^2 | kg", *_of_freedoms("dof_armature")),
     _Kind("joint", "friction loss", "N m | N", *_of_freedoms("dof_frictionloss")),
-    _Kind("joint", "range", "rad | m", *_within("jnt_range", "jnt_limited")),
+    _Kind("joint", "range", "rad | m", *_range_accessors("jnt_range", "jnt_limited")),
     _Kind("tendon", "coefficients", "", *_coefficients()),
     _Kind("tendon", "ends", "m", _read_ends, _write_ends),
-    _Kind("tendon", "stiffness", "N/m", *_field("tendon_stiffness", lambda model, t: t)),
-    _Kind("tendon", "damping", "N s/m", *_field("tendon_damping", lambda model, t: t)),
-    _Kind("tendon", "spring length", "m", *_field("tendon_lengthspring", lambda model, t: t)),
-    _Kind("tendon", "armature", "kg", *_field("tendon_armature", lambda model, t: t)),
+    _Kind("tendon", "stiffness", "N/m", *_number_accessors("tendon_stiffness", lambda model, t: t)),
+    _Kind("tendon", "damping", "N s/m", *_number_accessors("tendon_damping", lambda model, t: t)),
+    _Kind("tendon", "spring length", "m", *_number_accessors("tendon_lengthspring", lambda model, t: t)),
+    _Kind("tendon", "armature", "kg", *_number_accessors("tendon_armature", lambda model, t: t)),
     _Kind("equality", "coupling", "(acts, offset, ratio)", _read_tie, _write_tie),
     _Kind("equality", "joint", "(acts, ends)", _read_joint, _write_joint),
     _Kind("equality", "softness", "(solref, solimp)", _read_softness, _write_softness),
     _Kind("actuator", "gear", "", _read_gear, _write_gear),
-    _Kind("actuator", "gain", "", *_law("actuator_gainprm", "actuator_gaintype", 1)),
-    _Kind("actuator", "bias", "", *_law("actuator_biasprm", "actuator_biastype", 0)),
-    _Kind("actuator", "control range", "", *_within("actuator_ctrlrange", "actuator_ctrllimited")),
+    _Kind("actuator", "gain", "", *_actuator_law_accessors("actuator_gainprm", "actuator_gaintype", 1)),
+    _Kind("actuator", "bias", "", *_actuator_law_accessors("actuator_biasprm", "actuator_biastype", 0)),
+    _Kind("actuator", "control range", "", *_range_accessors("actuator_ctrlrange", "actuator_ctrllimited")),
     _Kind("actuator", "place of the site", "(m, quaternion)", _read_site, _write_site),
-    *(_Kind(sort, kind, "", read, write) for sort, kind, read, write in WORDS),
+    *(_Kind(sort, kind, "", read, write) for sort, kind, read, write in WORD_ELEMENTS),
 )
-DROPPED = (
+REMOVABLE_KINDS = (
     "gravity",
     "gravity compensation",
     "stiffness",

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 
 from models.engines.native_parts import Connection, Coupling
-from models.own_model.coordinates import BALL, FREE
-from models.own_model.names import disabled, label, massive, moving, rotation_of, vector
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
+from models.own_model.names import body_with_mass, feature_is_disabled, label, moving_bodies, rotation_of, three_numbers
 
-CONNECT, WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
+CONNECT_EQUALITY, WELD_EQUALITY = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
 
 def is_tie(model: mujoco.MjModel, equality: int) -> bool:
@@ -17,33 +17,33 @@ def is_tie(model: mujoco.MjModel, equality: int) -> bool:
     if model.eq_type[equality] != mujoco.mjtEq.mjEQ_JOINT or model.eq_data[equality, 2:5].any():
         return False
     joints = [j for j in (model.eq_obj1id[equality], model.eq_obj2id[equality]) if j >= 0]
-    return not any(model.jnt_type[j] in (BALL, FREE) for j in joints)
+    return not any(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT) for j in joints)
 
 
-def couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
+def joint_couplings(model: mujoco.MjModel) -> Iterator[Coupling]:
     """Active equality constraints of one or two joints."""
-    if disabled(model, "EQUALITY"):
+    if feature_is_disabled(model, "EQUALITY"):
         return
     for e in (e for e in range(model.neq) if model.eq_active0[e] and is_tie(model, e)):
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         driver = int(model.jnt_dofadr[second]) if second >= 0 else None
         offset, ratio = model.eq_data[e, :2].tolist()
-        softness = _softness(model, e)
+        softness = _stiffness_and_damping(model, e)
         yield Coupling(label(model, "equality", e), int(model.jnt_dofadr[first]), driver, ratio, offset, *softness)
 
 
-def _softness(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _stiffness_and_damping(model: mujoco.MjModel, equality: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """MuJoCo's solref, converted to stiffness and damping so that it does not depend on the step, and solimp."""
     time, ratio = model.eq_solref[equality].tolist()
     if time > 0.0 and ratio > 0.0:
-        time = time if disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
+        time = time if feature_is_disabled(model, "REFSAFE") else max(time, 2.0 * float(model.opt.timestep))
         time, ratio = -1.0 / (time * ratio) ** 2, -2.0 / time
     return (time, ratio), tuple(model.eq_solimp[equality].tolist())
 
 
-def joins(model: mujoco.MjModel, equality: int) -> bool:
+def joins_bodies(model: mujoco.MjModel, equality: int) -> bool:
     """Whether an equality constraint connects points of two bodies, or fixes the bodies to each other."""
-    return int(model.eq_type[equality]) in (CONNECT, WELD)
+    return int(model.eq_type[equality]) in (CONNECT_EQUALITY, WELD_EQUALITY)
 
 
 def by_sites(model: mujoco.MjModel, equality: int) -> bool:
@@ -53,24 +53,24 @@ def by_sites(model: mujoco.MjModel, equality: int) -> bool:
 
 def connections(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Connection]:
     """Active equality constraints between points of two bodies, or between points and axes."""
-    if disabled(model, "EQUALITY"):
+    if feature_is_disabled(model, "EQUALITY"):
         return
-    numbers = moving(model)
-    for e in (e for e in range(model.neq) if model.eq_active0[e] and joins(model, e)):
+    numbers = moving_bodies(model)
+    for e in (e for e in range(model.neq) if model.eq_active0[e] and joins_bodies(model, e)):
         things = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
         bodies = [int(model.site_bodyid[thing]) if by_sites(model, e) else thing for thing in things]
-        first, second = (massive(b) if b in numbers else None for b in bodies)
+        first, second = (body_with_mass(b) if b in numbers else None for b in bodies)
         if first == second:
             continue
-        (start, turned), (end, other) = _frames(model, design, e)
-        turns = model.eq_type[e] == WELD and model.eq_data[e, 10]
+        (start, turned), (end, other) = _frames_of_ends(model, design, e)
+        turns = model.eq_type[e] == WELD_EQUALITY and model.eq_data[e, 10]
         axes = (turned, other) if turns else None
-        softness = _softness(model, e)
-        ends = (first, vector(start)), (second, vector(end))
+        softness = _stiffness_and_damping(model, e)
+        ends = (first, three_numbers(start)), (second, three_numbers(end))
         yield Connection(label(model, "equality", e), ends, axes, *softness, float(model.eq_data[e, 10]))
 
 
-def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def _frames_of_ends(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Points (3,) and axes (3, 3) at both ends of a constraint in the design position; they coincide where the
     constraint is satisfied.
 
@@ -80,7 +80,7 @@ def _frames(model: mujoco.MjModel, design: mujoco.MjData, equality: int) -> list
     if by_sites(model, equality):
         return [(design.site_xpos[s].copy(), design.site_xmat[s].reshape(3, 3).copy()) for s in things]
     points, axes = [data[:3], data[3:6]], [np.eye(3), np.eye(3)]
-    if model.eq_type[equality] == WELD:
+    if model.eq_type[equality] == WELD_EQUALITY:
         points, axes = points[::-1], [rotation_of(data[6:10]), np.eye(3)]
     turns = [design.xmat[b].reshape(3, 3) for b in things]
     places = [design.xpos[b] + turn @ point for b, turn, point in zip(things, turns, points, strict=True)]

@@ -14,16 +14,33 @@ import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import PLAIN, Moved, equations
-from models.own_model.certificate import ALIKE, Agreement, Reference, agreement, moved_at, reference, states_of
-from models.own_model.elements import Element, drop, elements, is_word, put, short, tensor_of, told_apart
-from models.own_model.reading import TwinModel, described
+from models.own_model.builds import PLAIN_BUILD, Moved, equations_of_build
+from models.own_model.certificate import (
+    EQUAL_ACCELERATION_SHARE,
+    Agreement,
+    Reference,
+    agreement_of_build,
+    moved_at,
+    reference_of_file,
+    states_of,
+)
+from models.own_model.elements import (
+    Element,
+    drop,
+    elements_of_model,
+    is_word,
+    put,
+    tensor_of,
+    told_apart,
+    two_digit_text,
+)
+from models.own_model.reading import TwinModel, described_model
 
-STATES = 20
+STATE_COUNT = 20
 """States at which elements are tried."""
-OFF = ("range", "softness")
+UNCOMPARED_KINDS = ("range", "softness")
 """Kinds of elements that are off, or that MuJoCo alone has: a difference in them is listed, and not compared."""
-STILL = 1e-11
+NO_EFFECT_SHARE = 1e-11
 """Relative change of accelerations and of the mass matrix below which an element has no influence: a tenth of what
 counts as different, and above the 7e-12 that rounding alone was seen to make of a coordinate near 0."""
 Key = tuple[str, str]
@@ -63,7 +80,7 @@ class Comparison:
     """Comparison of two files: agreement of their accelerations; different elements, the most influential first; the
     remaining disagreement when all of these are taken over; and coordinates that only one file has."""
 
-    apart: Agreement | None
+    acceleration_agreement: Agreement | None
     differences: tuple[Difference, ...]
     unexplained: float
     unmatched: tuple[str, ...]
@@ -71,14 +88,14 @@ class Comparison:
     @property
     def alike(self) -> bool:
         """Whether both move alike."""
-        return self.apart is not None and self.apart.alike
+        return self.acceleration_agreement is not None and self.acceleration_agreement.alike
 
     @property
     def influential(self) -> tuple[Difference, ...]:
         """Differences that change accelerations or the mass matrix, and those whose influence could not be
         determined."""
         tried = (each for each in self.differences if not each.off)
-        return tuple(each for each in tried if each.influence is None or each.influence > STILL)
+        return tuple(each for each in tried if each.influence is None or each.influence > NO_EFFECT_SHARE)
 
     @property
     def not_compared(self) -> tuple[Difference, ...]:
@@ -86,43 +103,48 @@ class Comparison:
         return tuple(each for each in self.differences if each.off)
 
     @property
-    def silent(self) -> tuple[Difference, ...]:
+    def silent_differences(self) -> tuple[Difference, ...]:
         """Differences that change neither accelerations nor the mass matrix."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
     def rest(self) -> str:
         """Text on the disagreement that remains when all possible elements are taken over."""
-        if self.unexplained <= ALIKE:
-            return f"with these taken over, both move alike: {short(self.unexplained)} is left"
+        if self.unexplained <= EQUAL_ACCELERATION_SHARE:
+            return f"with these taken over, both move alike: {two_digit_text(self.unexplained)} is left"
         untried = any(each.influence is None for each in self.influential)
         why = "what cannot be tried" if untried else "something that is no element here, or that these change together"
         return (
-            f"with these taken over where they can be, accelerations still differ by {short(self.unexplained)}: {why}"
+            "with these taken over where they can be, accelerations still differ by "
+            f"{two_digit_text(self.unexplained)}: {why}"
         )
 
 
-def compare(first: TwinModel, second: TwinModel, count: int = STATES) -> Comparison:
+def compare(first: TwinModel, second: TwinModel, count: int = STATE_COUNT) -> Comparison:
     """Comparison of two files, at random states within the ranges of the first file."""
-    unmatched = _unmatched(first, second)
+    unmatched = _unmatched_coordinates(first, second)
     if unmatched:
         return Comparison(None, tuple(_differences(first, second, None)), np.inf, tuple(unmatched))
     order = [second.names.index(name) for name in first.names]
     states = states_of(first, count)
     places = _in_order(states, order)
-    here, there = reference(first, states, PLAIN), reference(second, places, PLAIN)
-    apart = agreement("the second file", _rounded_as_both(here, there, order), _permuted(there.moved, order))
-    trial = _Trial(first, states, replace(here, moved=moved_at(equations(first, PLAIN), states)))
-    back = _Trial(second, places, replace(there, moved=moved_at(equations(second, PLAIN), places)))
-    differences = sorted(_differences(first, second, (trial, back)), key=_importance)
-    model, taken = trial.with_all(elements(second.model), differences)
+    here, there = reference_of_file(first, states, PLAIN_BUILD), reference_of_file(second, places, PLAIN_BUILD)
+    apart = agreement_of_build(
+        "the second file", _rounded_as_both(here, there, order), _reordered_motion(there.moved, order)
+    )
+    trial = _Trial(first, states, replace(here, moved=moved_at(equations_of_build(first, PLAIN_BUILD), states)))
+    back = _Trial(second, places, replace(there, moved=moved_at(equations_of_build(second, PLAIN_BUILD), places)))
+    differences = sorted(_differences(first, second, (trial, back)), key=_importance_key)
+    model, taken = trial.with_all(elements_of_model(second.model), differences)
     moved = trial.moved(model)
     alone = [each.key for each in differences if each.first is None and each.key not in taken]
     rest = back.moved(back.without(alone))
-    left = agreement("", replace(_rounded_as_both(here, there, order), moved=moved), _permuted(rest, order))
+    left = agreement_of_build(
+        "", replace(_rounded_as_both(here, there, order), moved=moved), _reordered_motion(rest, order)
+    )
     return Comparison(apart, tuple(differences), left.acceleration, ())
 
 
-def _importance(difference: Difference) -> float:
+def _importance_key(difference: Difference) -> float:
     """Sort key: differences with unknown influence first, then the most influential."""
     return -np.inf if difference.influence is None else -difference.influence
 
@@ -139,8 +161,8 @@ class _Trial:
         """Largest relative change that a changed model causes in accelerations, or in the mass matrix if these do not
         change; None if it cannot be built."""
         try:
-            change = agreement("", self.base, self.moved(model))
-            return change.acceleration if change.acceleration > STILL else change.mass
+            change = agreement_of_build("", self.base, self.moved(model))
+            return change.acceleration if change.acceleration > NO_EFFECT_SHARE else change.mass
         except RunFailed:
             return None
 
@@ -172,7 +194,7 @@ class _Trial:
 
     def moved(self, model: mujoco.MjModel) -> list[Moved]:
         """Motion of a changed model at the states."""
-        return moved_at(equations(described(model, self.twin.name), PLAIN), self.states)
+        return moved_at(equations_of_build(described_model(model, self.twin.name), PLAIN_BUILD), self.states)
 
 
 def _in_order(states: States, order: list[int]) -> States:
@@ -181,18 +203,18 @@ def _in_order(states: States, order: list[int]) -> States:
     return [(q[places], v[places]) for q, v in states]
 
 
-def _permuted(moved: Sequence[Moved], order: list[int]) -> list[Moved]:
+def _reordered_motion(moved: Sequence[Moved], order: list[int]) -> list[Moved]:
     """Motion of the second file, reordered to the coordinates of the first."""
     return [Moved(each.mass[np.ix_(order, order)], each.force[order], each.acceleration[order]) for each in moved]
 
 
 def _rounded_as_both(here: Reference, there: Reference, order: list[int]) -> Reference:
     """The first file's reference, with the larger rounding sensitivity of the two files."""
-    pairs = zip(here.sensitive, _permuted(there.sensitive, order), strict=True)
-    return replace(here, sensitive=[Moved(*map(np.maximum, first, second)) for first, second in pairs])
+    pairs = zip(here.sensitivities, _reordered_motion(there.sensitivities, order), strict=True)
+    return replace(here, sensitivities=[Moved(*map(np.maximum, first, second)) for first, second in pairs])
 
 
-def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
+def _unmatched_coordinates(first: TwinModel, second: TwinModel) -> list[str]:
     """Coordinates of one file that do not exist in the other."""
     names = [(twin.name, twin.names) for twin in (first, second)]
     rows = list[str]()
@@ -204,24 +226,26 @@ def _unmatched(first: TwinModel, second: TwinModel) -> list[str]:
 def _differences(first: TwinModel, second: TwinModel, trials: tuple[_Trial, _Trial] | None) -> list[Difference]:
     """Elements that differ between the files; trials : one for the first and one for the second file, None if they have
     no common states."""
-    rows, listed, others = list[Difference](), elements(first.model), elements(second.model)
+    rows, listed, others = list[Difference](), elements_of_model(first.model), elements_of_model(second.model)
     rubbing = first.driven.frictions or second.driven.frictions
     for key in dict.fromkeys((*listed, *others)):
         element, other = listed.get(key), others.get(key)
-        if element is not None and other is not None and element.same(other):
+        if element is not None and other is not None and element.has_same_value(other):
             continue
         there = element if element is not None else other
         if there is None or _says_nothing(there, element, other):
             continue
-        influence = _influence(trials, key, element, other) if trials is not None else None
+        influence = _influence_of_difference(trials, key, element, other) if trials is not None else None
         first_value, second_value = (None if each is None else each.value for each in (element, other))
         kind = "orientation of the inertia" if _only_turned(key[0], element, other) else key[0]
-        off = key[0] in OFF or (key[0] == "friction loss" and not rubbing)
+        off = key[0] in UNCOMPARED_KINDS or (key[0] == "friction loss" and not rubbing)
         rows.append(Difference(*key, there.unit, first_value, second_value, influence, off, kind))
     return rows
 
 
-def _influence(trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None) -> float | None:
+def _influence_of_difference(
+    trials: tuple[_Trial, _Trial], key: Key, element: Element | None, other: Element | None
+) -> float | None:
     """Influence of one difference: the first file takes over the other's value, or the second file loses an element
     that only it has. None if the first file cannot have that value."""
     first, second = trials
@@ -244,22 +268,24 @@ def _only_turned(kind: str, element: Element | None, other: Element | None) -> b
 
 def _says_nothing(there: Element, element: Element | None, other: Element | None) -> bool:
     """Whether an element that only one file has is insignificant: zero, or a word that repeats other elements."""
-    return (element is None or other is None) and (is_word(there.value) or not there.says)
+    return (element is None or other is None) and (is_word(there.value) or not there.is_nonzero)
 
 
-def culprits(twin: TwinModel, build: str, count: int = STATES) -> list[tuple[Element, float]]:
+def removals_that_agree(twin: TwinModel, build: str, count: int = STATE_COUNT) -> list[tuple[Element, float]]:
     """Elements whose removal makes a build agree with the file's own model; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """
     states = states_of(twin, count)
     rows = list[tuple[Element, float]]()
-    for key, element in elements(twin.model).items():
+    for key, element in elements_of_model(twin.model).items():
         model = copy(twin.model)
-        if not element.says or not drop(model, key):
+        if not element.is_nonzero or not drop(model, key):
             continue
-        less = described(model, twin.name)
-        seen = agreement(build, reference(less, states, build), moved_at(equations(less, build), states))
+        less = described_model(model, twin.name)
+        seen = agreement_of_build(
+            build, reference_of_file(less, states, build), moved_at(equations_of_build(less, build), states)
+        )
         if seen.alike:
             rows.append((element, seen.acceleration))
     return sorted(rows, key=lambda row: row[1])

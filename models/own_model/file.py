@@ -10,18 +10,18 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.engines.mujoco_quiet import without_warnings
-from models.own_model.content import Content, check_and_leave_out, ranges
-from models.own_model.reading import TwinModel, described
-from models.own_model.xml_guard import Document, guarded
+from models.own_model.content import Content, check_and_leave_out, limits_switched_off
+from models.own_model.reading import TwinModel, described_model
+from models.own_model.xml_guard import Document, checked_document
 
-FINITE = (
+NUMBERS_OF_MOTION = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_gravcomp", "site_pos", "site_quat"),
     *("qpos0", "qpos_spring", "jnt_stiffness", "jnt_range", "dof_damping", "dof_armature", "dof_frictionloss"),
     *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
 )
 """Numbers of a compiled model that move something."""
-LARGEST = 1e30
+LARGEST_NUMBER = 1e30
 """Above, no mechanism has a number, and sums of them are not finite."""
 
 
@@ -29,29 +29,29 @@ LARGEST = 1e30
 class ModelFile:
     """A file that was read.
 
-    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out; limited :
-    joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes : sentences on
-    what reading passed over.
+    document : its elements; own : its model; left_out : what has no equal here, and was asked to be left out;
+    ignored_limits : joints and tendons whose limits are switched off, and inside whose ranges states are drawn; notes :
+    sentences on what reading passed over.
     """
 
     document: Document
     twin: TwinModel
     left_out: tuple[Content, ...]
-    limited: tuple[str, ...]
+    ignored_limits: tuple[str, ...]
     notes: tuple[str, ...]
 
 
 def read(path: Path, without: Collection[str] = ()) -> ModelFile:
     """The file at a path; InputError for what cannot be read, or has no equal and is not named in ``without``."""
-    document = guarded(path)
-    model, notes = compiled(document)
+    document = checked_document(path)
+    model, notes = compiled_model(document)
     check_sane(model, path.name)
     left_out = check_and_leave_out(model, document, without)
-    twin = described(model, path.stem)
-    return ModelFile(document, twin, tuple(left_out), tuple(ranges(model)), tuple(notes))
+    twin = described_model(model, path.stem)
+    return ModelFile(document, twin, tuple(left_out), tuple(limits_switched_off(model)), tuple(notes))
 
 
-def compiled(document: Document) -> tuple[mujoco.MjModel, list[str]]:
+def compiled_model(document: Document) -> tuple[mujoco.MjModel, list[str]]:
     """The document compiled by MuJoCo's own parser, and notes; InputError with the parser's message."""
     path, notes = document.path, list[str]()
     try:
@@ -82,12 +82,12 @@ def check_sane(model: mujoco.MjModel, name: str) -> None:
     """InputError if nothing can move, or if a number that affects motion is not finite."""
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
-    for numbers in FINITE:
+    for numbers in NUMBERS_OF_MOTION:
         values = np.asarray(getattr(model, numbers))
         if not np.isfinite(values).all():
             raise InputError(name, numbers, None, "must be finite numbers")
-        if values.size and np.abs(values).max() > LARGEST:
-            raise InputError(name, numbers, float(np.abs(values).max()), f"must be {LARGEST:g} or less")
+        if values.size and np.abs(values).max() > LARGEST_NUMBER:
+            raise InputError(name, numbers, float(np.abs(values).max()), f"must be {LARGEST_NUMBER:g} or less")
     if not np.isfinite(model.opt.gravity).all():
         raise InputError(name, "option gravity", None, "must be finite numbers")
     if not (np.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):

@@ -14,7 +14,7 @@ import numpy as np
 from models.own_model.names import label
 from models.own_model.reading import TwinModel
 
-KINDS = {
+LIMIT_CONSTRAINTS = {
     int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT): "joint",
     int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON): "tendon",
 }
@@ -32,6 +32,8 @@ def limits_struck(twin: TwinModel) -> Callable[[np.ndarray], tuple[str, ...]]:
         data.qpos[:] = twin.coordinates.to_mujoco(q, still).qpos
         mujoco.mj_fwdPosition(model, data)
         rows = zip(data.efc_type.tolist(), data.efc_id.tolist(), strict=True)
-        return tuple(label(model, KINDS[kind], number) for kind, number in rows if kind in KINDS)
+        return tuple(
+            label(model, LIMIT_CONSTRAINTS[kind], number) for kind, number in rows if kind in LIMIT_CONSTRAINTS
+        )
 
     return struck

@@ -3,13 +3,13 @@
 import mujoco
 import numpy as np
 
-from models.own_model.coordinates import BALL, FREE, SLIDE
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.vehicles.spatial import FREEDOMS, Freedom, Vector
 
-TURNS: tuple[Freedom, ...] = ("rx", "ry", "rz")
-OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL: TURNS, FREE: FREEDOMS}
+ROTATION_NAMES: tuple[Freedom, ...] = ("rx", "ry", "rz")
+OF_KIND: dict[int, tuple[Freedom, ...]] = {BALL_JOINT: ROTATION_NAMES, FREE_JOINT: FREEDOMS}
 """Freedoms of joints that have several."""
-CONSTRAINTS = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
+CONSTRAINT_FEATURES = ("EQUALITY", "FRICTIONLOSS", "LIMIT", "CONTACT")
 
 
 def label(model: mujoco.MjModel, kind: str, number: int) -> str:
@@ -29,10 +29,10 @@ def coordinate_names(model: mujoco.MjModel) -> tuple[str, ...]:
 
 def place_of(model: mujoco.MjModel, joint: int) -> tuple[str, Freedom]:
     """Index of the coordinate of a hinge or slide."""
-    return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE else "rx"
+    return moved_by(joint), "x" if model.jnt_type[joint] == SLIDE_JOINT else "rx"
 
 
-def moving(model: mujoco.MjModel) -> dict[int, None]:
+def moving_bodies(model: mujoco.MjModel) -> dict[int, None]:
     """Indices, in order, of the bodies that move: they or a body before them in the tree have a joint."""
     numbers = dict[int, None]()
     for b in range(1, model.nbody):
@@ -51,9 +51,9 @@ def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     return joints
 
 
-def disabled(model: mujoco.MjModel, what: str) -> bool:
+def feature_is_disabled(model: mujoco.MjModel, what: str) -> bool:
     """Whether a file switches off a feature, such as "GRAVITY", or all constraints at once."""
-    kinds = (what, "CONSTRAINT") if what in CONSTRAINTS else (what,)
+    kinds = (what, "CONSTRAINT") if what in CONSTRAINT_FEATURES else (what,)
     return any(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}") for kind in kinds)
 
 
@@ -63,12 +63,12 @@ def moved_by(joint: int) -> str:
     return f"joint {joint}"
 
 
-def massive(body: int) -> str:
+def body_with_mass(body: int) -> str:
     """Name of the body that has the mass of a file's body and follows its last joint."""
     return f"body {body}"
 
 
-def vector(numbers: np.ndarray) -> Vector:
+def three_numbers(numbers: np.ndarray) -> Vector:
     """Three numbers as a tuple, the form used in descriptions."""
     x, y, z = np.asarray(numbers, float).tolist()
     return x, y, z
@@ -76,7 +76,7 @@ def vector(numbers: np.ndarray) -> Vector:
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """Matrix (3, 3) as a tuple of rows, the form used in descriptions."""
-    x, y, z = map(vector, matrix)
+    x, y, z = map(three_numbers, matrix)
     return x, y, z
 
 

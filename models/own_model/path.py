@@ -18,91 +18,106 @@ from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.multibody.plain.joint_elements import PlainTree
-from models.own_model.builds import PLAIN, SOFT, equations, plain_tree, sliding
-from models.own_model.content import ranges
-from models.own_model.control_table import ControlTable, Leg, constant_leg
-from models.own_model.elements import short
+from models.own_model.builds import PLAIN_BUILD, SOFT_BUILD, equations_of_build, plain_tree, sliding_states
+from models.own_model.content import limits_switched_off
+from models.own_model.control_table import ControlTable, PathSection, constant_leg
+from models.own_model.elements import two_digit_text
 from models.own_model.limits import limits_struck
-from models.own_model.reading import TwinModel, controls
+from models.own_model.reading import TwinModel, constant_controls
 from models.own_model.states import random_states
 
-DURATION = 1.0
+PATH_DURATION = 1.0
 """s"""
-ALIKE, DISTURBED = 1e-10, 1e-14
+EQUAL_PATH_SHARE, DISTURBANCE = 1e-10, 1e-14
 """Relative distance up to which paths are the same, and the disturbance that must stay below it."""
 MOST_STEPS = 100_000
 """Steps of a path: the plain equations take about a minute for these."""
-LARGEST = 1e6
+LARGEST_STATE = 1e6
 """m, rad, m/s, rad/s: what lies beyond has blown up."""
-FILE = "the file's own model"
+FILE_BUILD_NAME = "the file's own model"
 
 
 @dataclass(frozen=True)
 class PathReport:
-    """step (s); horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other build from
-    the first one up to there, relative; failed : what stopped a build; quaternions : whether the file's has them;
-    energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy; soft :
-    whether MuJoCo has soft constraints, so that its path is another one: from it the file's is counted then; rubbing :
-    whether there is dry friction: paths are compared as long as it slides; struck : whose limit, which is not
-    built, ends the comparison, empty if none's; controls : name of their file, empty where they are constant."""
+    """step (s); comparison_horizon : until when (s) a disturbance of 1e-14 stays below 1e-10; distances : of each other
+    build from the first one up to there, relative; failed : what stopped a build; has_quaternions : whether the file's
+    has them;
+    energy : what the balance of kinetic energy and work leaves, as a share of the largest kinetic energy;
+    has_soft_constraints : whether MuJoCo has soft constraints, so that its path is another one: from it the file's is
+    counted then;
+    has_dry_friction : whether there is dry friction: paths are compared as long as it slides; struck_limit : whose
+    limit, which is not built, ends the comparison, empty if none's; controls : name of their file, empty where they are
+    constant.
+    """
 
     step: float
-    horizon: float
+    comparison_horizon: float
     distances: dict[str, float]
     failed: dict[str, str]
-    quaternions: bool
+    has_quaternions: bool
     energy: float | None
-    soft: bool = False
-    rubbing: bool = False
-    struck: str = ""
+    has_soft_constraints: bool = False
+    has_dry_friction: bool = False
+    struck_limit: str = ""
     controls: str = ""
 
     @property
     def alike(self) -> bool:
         """Whether all builds have the same path; the file's own path counts only if it has the same coordinates."""
-        others = {FILE: self.quaternions, SOFT: self.soft}
+        others = {FILE_BUILD_NAME: self.has_quaternions, SOFT_BUILD: self.has_soft_constraints}
         held = [size for name, size in self.distances.items() if not others.get(name)]
-        return bool(held) and max(held) <= ALIKE
+        return bool(held) and max(held) <= EQUAL_PATH_SHARE
 
     def lines(self) -> list[str]:
         """Lines of text for the terminal."""
         under = f", under {self.controls}" if self.controls else ""
-        rows = [f"path over {DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state{under}:"]
+        rows = [
+            f"path over {PATH_DURATION:g} s by Runge-Kutta 4 with steps of {self.step:g} s, from a random state{under}:"
+        ]
         rows += [f"  {name} stopped: {why}" for name, why in self.failed.items()]
-        if self.struck:
+        if self.struck_limit:
             rows.append(
-                f"  compared up to {self.horizon:.3g} s, where {self.struck} strikes its limit, which is not built"
+                f"  compared up to {self.comparison_horizon:.3g} s, where {self.struck_limit} strikes its limit, "
+                "which is not built"
             )
-        elif not self.horizon:
+        elif not self.comparison_horizon:
             rows.append("  not compared: this step is too long for the motion; give the file a shorter one")
-        elif self.horizon < DURATION:
+        elif self.comparison_horizon < PATH_DURATION:
             rows.append(
-                f"  compared up to {self.horizon:.3g} s, where a disturbance of {DISTURBED:g} reaches {ALIKE:g}"
-                f"{', or dry friction sticks' if self.rubbing else ''}"
+                f"  compared up to {self.comparison_horizon:.3g} s, where a disturbance of {DISTURBANCE:g} "
+                f"reaches {EQUAL_PATH_SHARE:g}"
+                f"{', or dry friction sticks' if self.has_dry_friction else ''}"
             )
         for name, size in self.distances.items():
-            turned = " (quaternions: distance of the step's error)" if name == FILE and self.quaternions else ""
-            given = " (soft constraints give way)" if name == SOFT and self.soft else ""
-            first = SOFT if name == FILE and self.soft else ENGINES[0]
-            rows.append(f"  {name} from {first}: {short(size)}{turned}{given}")
+            turned = (
+                " (quaternions: distance of the step's error)"
+                if name == FILE_BUILD_NAME and self.has_quaternions
+                else ""
+            )
+            given = " (soft constraints give way)" if name == SOFT_BUILD and self.has_soft_constraints else ""
+            first = SOFT_BUILD if name == FILE_BUILD_NAME and self.has_soft_constraints else ENGINES[0]
+            rows.append(f"  {name} from {first}: {two_digit_text(size)}{turned}{given}")
         if self.energy is not None:
-            rows.append(f"  kinetic energy less work of all forces: {short(self.energy)} of the largest kinetic energy")
+            rows.append(
+                f"  kinetic energy less work of all forces: {two_digit_text(self.energy)} of the largest kinetic energy"
+            )
         return rows
 
 
 def steps_of_path(twin: TwinModel) -> int:
     """Number of steps of a path at the file's own step; InputError if there are too many."""
     step = float(twin.model.opt.timestep)
-    if DURATION / step > MOST_STEPS:
+    if PATH_DURATION / step > MOST_STEPS:
         allowed = (
-            f"paths over {DURATION:g} s would take {DURATION / step:,.0f} steps, of {MOST_STEPS:,} at the most: leave "
+            f"paths over {PATH_DURATION:g} s would take {PATH_DURATION / step:,.0f} steps, of "
+            f"{MOST_STEPS:,} at the most: leave "
             "them out with `--no-paths`, or give the file a longer step"
         )
         raise InputError(twin.name, "option timestep", step, allowed)
-    return int(np.ceil(DURATION / step - 1e-9))
+    return int(np.ceil(PATH_DURATION / step - 1e-9))
 
 
-def paths(
+def compare_paths(
     twin: TwinModel,
     step: float | None = None,
     table: ControlTable | None = None,
@@ -110,32 +125,36 @@ def paths(
 ) -> PathReport:
     """Paths over 1 s; step (s): the file's unless given; table : of controls, which are constant without; told : the
     share that is done. InputError for too many steps."""
-    steps = int(np.ceil(DURATION / step - 1e-9)) if step else steps_of_path(twin)
-    step, (q,), (v,) = DURATION / steps, *random_states(twin, 1)
-    legs = table.legs(twin, steps, step) if table else constant_leg(twin, steps)
+    steps = int(np.ceil(PATH_DURATION / step - 1e-9)) if step else steps_of_path(twin)
+    step, (q,), (v,) = PATH_DURATION / steps, *random_states(twin, 1)
+    legs = table.path_sections(twin, steps, step) if table else constant_leg(twin, steps)
     built, failed = dict[str, np.ndarray](), dict[str, str]()
-    for i, build in enumerate((*ENGINES, PLAIN)):
-        _march(build, partial(path_by, legs, build, (q, v), step), built, failed)
+    for i, build in enumerate((*ENGINES, PLAIN_BUILD)):
+        _march_build(build, partial(path_by, legs, build, (q, v), step), built, failed)
         told((i + 1) / (len(ENGINES) + 3))
     held = np.concatenate([np.tile(leg.controls, (leg.steps, 1)) for leg in legs])
-    _march(FILE, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
+    _march_build(FILE_BUILD_NAME, lambda: file_path(twin, (q, v), (steps, step), held=held), built, failed)
     first = built.pop(ENGINES[0], None)
     under = table.path.name if table else ""
     if first is None:
         return PathReport(step, 0.0, {}, failed, bool(twin.coordinates.turnings), None, controls=under)
     soft = twin.driven.tied
-    calm = PLAIN if soft and PLAIN in built else ENGINES[0]
-    disturbed = path_by(legs, calm, (q + DISTURBED, v), step)
+    calm = PLAIN_BUILD if soft and PLAIN_BUILD in built else ENGINES[0]
+    disturbed = path_by(legs, calm, (q + DISTURBANCE, v), step)
     rows = _sliding_rows(legs, first[: rows_alike(built.get(calm, first), disturbed, steps)])
     rows, struck = _unlimited_rows(twin, first[:rows])
-    base = {FILE: built.get(SOFT, first)} if soft else {}
-    distances = {name: _distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()}
-    energy = _ledger(legs, first[:rows], step)
+    base = {FILE_BUILD_NAME: built.get(SOFT_BUILD, first)} if soft else {}
+    distances = {
+        name: _relative_distance(twin, name, base.get(name, first)[:rows], path[:rows]) for name, path in built.items()
+    }
+    energy = _energy_imbalance(legs, first[:rows], step)
     kinds = bool(twin.coordinates.turnings), energy, soft, bool(twin.driven.frictions), struck, under
     return PathReport(step, (rows - 1) * step, distances, failed, *kinds)
 
 
-def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]) -> None:
+def _march_build(
+    name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray], failed: dict[str, str]
+) -> None:
     """Store the path of a build, or the reason why it failed."""
     try:
         with np.errstate(all="ignore"):  # what blows up is told
@@ -151,26 +170,26 @@ def _march(name: str, run: Callable[[], np.ndarray], built: dict[str, np.ndarray
 
 def blown_up(path: np.ndarray) -> bool:
     """Whether the path contains numbers that are infinite, NaN or absurdly large."""
-    return not (np.isfinite(path).all() and np.abs(path).max() < LARGEST)
+    return not (np.isfinite(path).all() and np.abs(path).max() < LARGEST_STATE)
 
 
-def path_by(legs: Sequence[Leg], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
+def path_by(legs: Sequence[PathSection], build: str, start: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
     """States (steps + 1, 2 n) of a build, integrated from coordinates and rates (n,) section by section, with ``step``
     seconds per step."""
     path = np.concatenate(start)[None]
     for leg in legs:
         q, v = np.split(path[-1], 2)
-        path = np.concatenate((path, _model(leg.twin, build).march(q, v, leg.steps, step)[1:]))
+        path = np.concatenate((path, _model_of_build(leg.twin, build).march(q, v, leg.steps, step)[1:]))
     return path
 
 
-def _model(twin: TwinModel, build: str) -> FreeModel:
-    if twin.driven.tied and build != SOFT:
-        move = equations(twin, build)
+def _model_of_build(twin: TwinModel, build: str) -> FreeModel:
+    if twin.driven.tied and build != SOFT_BUILD:
+        move = equations_of_build(twin, build)
         return Plain(build, lambda time, q, v: move(q, v).acceleration, twin.size)
-    if build != PLAIN:
+    if build != PLAIN_BUILD:
         return free_model(build, twin.driven)
-    return Plain(PLAIN, plain_tree(twin).acceleration, twin.size)
+    return Plain(PLAIN_BUILD, plain_tree(twin).acceleration, twin.size)
 
 
 def file_path(
@@ -186,7 +205,7 @@ def file_path(
     before = model.opt.timestep, model.opt.integrator
     model.opt.timestep, model.opt.integrator = step, INTEGRATORS[integrator]
     state = twin.coordinates.to_mujoco(*start)
-    held = np.tile(controls(model), (steps, 1)) if held is None else held
+    held = np.tile(constant_controls(model), (steps, 1)) if held is None else held
     try:
         return march(model, data, np.concatenate((state.qpos, state.qvel)), held)
     finally:
@@ -196,17 +215,17 @@ def file_path(
 def rows_alike(first: np.ndarray, disturbed: np.ndarray, steps: int) -> int:
     """Number of states before a small disturbance grows so much that two paths count as different."""
     size = np.maximum.accumulate(np.abs(first).max(axis=1))
-    grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= ALIKE * np.maximum(size, 1.0)))
+    grown = np.flatnonzero(~(np.abs(disturbed - first).max(axis=1) <= EQUAL_PATH_SHARE * np.maximum(size, 1.0)))
     return max(2, int(grown[0])) if len(grown) else steps + 1
 
 
-def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
+def _sliding_rows(legs: Sequence[PathSection], path: np.ndarray) -> int:
     """Number of states of a path before dry friction sticks in MuJoCo; one less, since the step before may already be
     affected."""
     acting = (leg.twin for leg in legs for _ in range(leg.steps))
     for i, (twin, row) in enumerate(zip(acting, path, strict=False)):
         q, v = np.split(row, 2)
-        if twin.driven.frictions and not sliding(twin, [(q, v)]):
+        if twin.driven.frictions and not sliding_states(twin, [(q, v)]):
             return max(2, i - 1)
     return len(path)
 
@@ -214,15 +233,15 @@ def _sliding_rows(legs: Sequence[Leg], path: np.ndarray) -> int:
 def _unlimited_rows(twin: TwinModel, path: np.ndarray) -> tuple[int, str]:
     """Number of states of a path before it reaches a joint limit, and the joint's name; one less, since the step before
     may already be affected."""
-    struck = limits_struck(twin) if ranges(twin.model) else lambda q: ()
+    struck = limits_struck(twin) if limits_switched_off(twin.model) else lambda q: ()
     for i, row in enumerate(path):
         if names := struck(row[: twin.size]):
             return max(2, i - 1), names[0]
     return len(path), ""
 
 
-def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:
-    if name == FILE:
+def _relative_distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -> float:
+    if name == FILE_BUILD_NAME:
         n = twin.size
         states = [twin.coordinates.to_mujoco(row[:n], row[n:]) for row in first]
         first = np.array([np.concatenate((state.qpos, state.qvel)) for state in states])
@@ -233,7 +252,7 @@ def _distance(twin: TwinModel, name: str, first: np.ndarray, path: np.ndarray) -
     return float(np.abs(path - first).max() / max(1.0, np.abs(first).max()))
 
 
-def _ledger(legs: Sequence[Leg], path: np.ndarray, step: float) -> float | None:
+def _energy_imbalance(legs: Sequence[PathSection], path: np.ndarray, step: float) -> float | None:
     """Change of kinetic energy less the work of all forces (Simpson's rule), relative to the largest kinetic energy;
     None for fewer than three states."""
     if len(path) < 3:

@@ -12,21 +12,21 @@ import numpy as np
 
 from models.engines.free_vehicle import Driven
 from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, LineSpring, TurningSpring, joint_parts
-from models.own_model.coordinates import BALL, FREE, Coordinates
-from models.own_model.equalities import connections, couplings
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
+from models.own_model.equalities import connections, joint_couplings
 from models.own_model.names import (
     OF_KIND,
+    body_with_mass,
     coordinate_names,
-    disabled,
+    feature_is_disabled,
     joints_above,
     label,
-    massive,
     matrix_rows,
     moved_by,
-    moving,
+    moving_bodies,
     place_of,
     rotation_of,
-    vector,
+    three_numbers,
 )
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -56,17 +56,17 @@ class TwinModel:
         return coordinate_names(self.model)
 
 
-def described(model: mujoco.MjModel, name: str) -> TwinModel:
+def described_model(model: mujoco.MjModel, name: str) -> TwinModel:
     """The model as a description; parts without an equivalent (see ``content``) must have been removed before."""
     design = mujoco.MjData(model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
     elements = joint_elements(model)
     vehicle = SpatialVehicle(name, tuple(_bodies(model, design)), (), (), (), joint_elements=elements)
-    gravity = np.zeros(3) if disabled(model, "GRAVITY") else np.array(model.opt.gravity)
-    loads = tuple(_lifted(model, design, gravity))
+    gravity = np.zeros(3) if feature_is_disabled(model, "GRAVITY") else np.array(model.opt.gravity)
+    loads = tuple(_compensated_loads(model, design, gravity))
     lines = tuple(line_springs(model, design))
-    ties = tuple(dry_frictions(model)), tuple(couplings(model)), tuple(connections(model, design))
+    ties = tuple(dry_frictions(model)), tuple(joint_couplings(model)), tuple(connections(model, design))
     parts = joint_parts(vehicle)
     turns = tuple(turning_springs(model, design))
     pushes = tuple(body_loads(model, design))
@@ -81,29 +81,31 @@ def joint_elements(model: mujoco.MjModel) -> tuple[JointElement, ...]:
 
 
 def _bodies(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Body]:
-    numbers = moving(model)
+    numbers = moving_bodies(model)
     for b in numbers:
         above = int(model.body_parentid[b])
-        behind = massive(above) if above in numbers else None
+        behind = body_with_mass(above) if above in numbers else None
         for j in range(model.body_jntadr[b], model.body_jntadr[b] + model.body_jntnum[b]):
-            yield _joint(model, design, j, behind)
+            yield _joint_body(model, design, j, behind)
             behind = moved_by(j)
         axes = design.ximat[b].reshape(3, 3)
-        inertia = matrix_rows(axes * model.body_inertia[b] @ axes.T + _armature(model, b))
-        yield Body(massive(b), float(model.body_mass[b]), vector(design.xipos[b]), (), inertia, behind)
+        inertia = matrix_rows(axes * model.body_inertia[b] @ axes.T + _armature_inertia(model, b))
+        yield Body(body_with_mass(b), float(model.body_mass[b]), three_numbers(design.xipos[b]), (), inertia, behind)
 
 
-def _joint(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | None) -> Body:
+def _joint_body(model: mujoco.MjModel, design: mujoco.MjData, j: int, behind: str | None) -> Body:
     """A body without mass that moves as a joint does."""
     kind, body = int(model.jnt_type[j]), int(model.jnt_bodyid[j])
     if kind in OF_KIND:
-        anchor = design.xpos[body] if kind == FREE else design.xanchor[j]
-        return Body(moved_by(j), 0.0, vector(anchor), OF_KIND[kind], parent=behind)
+        anchor = design.xpos[body] if kind == FREE_JOINT else design.xanchor[j]
+        return Body(moved_by(j), 0.0, three_numbers(anchor), OF_KIND[kind], parent=behind)
     freedoms: tuple[Freedom, ...] = (place_of(model, j)[1],)
-    return Body(moved_by(j), 0.0, vector(design.xanchor[j]), freedoms, parent=behind, axes=_along(design.xaxis[j]))
+    return Body(
+        moved_by(j), 0.0, three_numbers(design.xanchor[j]), freedoms, parent=behind, axes=_axes_along(design.xaxis[j])
+    )
 
 
-def _along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
+def _axes_along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """Right-handed axes, as rows, of which the first is the given unit vector."""
     if axis[0] == 1.0:
         return PARALLEL
@@ -112,18 +114,18 @@ def _along(axis: np.ndarray) -> tuple[Vector, Vector, Vector]:
     return matrix_rows(np.array((axis, second, np.cross(axis, second))))
 
 
-def _armature(model: mujoco.MjModel, body: int) -> np.ndarray:
+def _armature_inertia(model: mujoco.MjModel, body: int) -> np.ndarray:
     """Inertia (3, 3), the same about all axes, that the armature on the rotation of a free body adds."""
     joint = int(model.body_jntadr[body])
-    free = joint >= 0 and model.jnt_type[joint] == FREE
+    free = joint >= 0 and model.jnt_type[joint] == FREE_JOINT
     return float(model.dof_armature[model.jnt_dofadr[joint] + 3]) * np.eye(3) if free else np.zeros((3, 3))
 
 
 def _joint_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
-    springs, dampers = not disabled(model, "SPRING"), not disabled(model, "DAMPER")
+    springs, dampers = not feature_is_disabled(model, "SPRING"), not feature_is_disabled(model, "DAMPER")
     for j in range(model.njnt):
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
-        free, ball = model.jnt_type[j] == FREE, model.jnt_type[j] == BALL
+        free, ball = model.jnt_type[j] == FREE_JOINT, model.jnt_type[j] == BALL_JOINT
         freedoms: tuple[Freedom, ...] = ("x", "y", "z") if free else () if ball else (place_of(model, j)[1],)
         for i, freedom in enumerate(freedoms):
             stiffness = float(model.jnt_stiffness[j]) * springs
@@ -160,22 +162,26 @@ def sites_of(model: mujoco.MjModel, tendon: int) -> list[int]:
 
 def line_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[LineSpring]:
     """Springs and dampers of tendons between two sites."""
-    springs, dampers, numbers = not disabled(model, "SPRING"), not disabled(model, "DAMPER"), moving(model)
+    springs, dampers, numbers = (
+        not feature_is_disabled(model, "SPRING"),
+        not feature_is_disabled(model, "DAMPER"),
+        moving_bodies(model),
+    )
     for t in (t for t in range(model.ntendon) if is_line(model, t)):
         stiffness, damping = float(model.tendon_stiffness[t]) * springs, float(model.tendon_damping[t]) * dampers
         bodies = [int(model.site_bodyid[s]) for s in sites_of(model, t)]
         if (stiffness or damping) and bodies[0] != bodies[1]:
-            first, second = (massive(b) if b in numbers else None for b in bodies)
-            start, end = (vector(design.site_xpos[s]) for s in sites_of(model, t))
+            first, second = (body_with_mass(b) if b in numbers else None for b in bodies)
+            start, end = (three_numbers(design.site_xpos[s]) for s in sites_of(model, t))
             length = float(model.tendon_lengthspring[t, 0])
             yield LineSpring(label(model, "tendon", t), first, second, start, end, stiffness, damping, length)
 
 
 def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[TurningSpring]:
     """Springs and dampers of the rotation of ball and free joints; those of translation are in ``joint_elements``."""
-    springs, dampers = not disabled(model, "SPRING"), not disabled(model, "DAMPER")
-    for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL, FREE)):
-        body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE
+    springs, dampers = not feature_is_disabled(model, "SPRING"), not feature_is_disabled(model, "DAMPER")
+    for j in (j for j in range(model.njnt) if model.jnt_type[j] in (BALL_JOINT, FREE_JOINT)):
+        body, free = int(model.jnt_bodyid[j]), model.jnt_type[j] == FREE_JOINT
         stiffness = float(model.jnt_stiffness[j]) * springs
         damping = float(model.dof_damping[model.jnt_dofadr[j] + 3 * free]) * dampers
         if not (stiffness or damping):
@@ -183,30 +189,34 @@ def turning_springs(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[Tu
         place, axes = int(model.jnt_qposadr[j]) + 3 * free, design.xmat[body].reshape(3, 3).copy()
         rest = rotation_of(model.qpos_spring[place : place + 4])
         yield TurningSpring(
-            label(model, "joint", j), _beside(model, j), (rest if free else axes @ rest, axes), stiffness, damping
+            label(model, "joint", j),
+            _bodies_beside(model, j),
+            (rest if free else axes @ rest, axes),
+            stiffness,
+            damping,
         )
 
 
-def _beside(model: mujoco.MjModel, joint: int) -> tuple[str | None, str]:
+def _bodies_beside(model: mujoco.MjModel, joint: int) -> tuple[str | None, str]:
     """Names of the bodies before and after a joint. A massless body stands between two joints of the same body."""
     body = int(model.jnt_bodyid[joint])
     first, above = int(model.body_jntadr[body]), int(model.body_parentid[body])
     last = first + int(model.body_jntnum[body]) - 1
-    before = moved_by(joint - 1) if joint > first else massive(above) if above in moving(model) else None
-    return before, moved_by(joint) if joint < last else massive(body)
+    before = moved_by(joint - 1) if joint > first else body_with_mass(above) if above in moving_bodies(model) else None
+    return before, moved_by(joint) if joint < last else body_with_mass(body)
 
 
-def rubs(model: mujoco.MjModel, joint: int) -> bool:
+def has_dry_friction(model: mujoco.MjModel, joint: int) -> bool:
     """Whether a hinge or slide has dry friction."""
-    several = model.jnt_type[joint] in (BALL, FREE)
+    several = model.jnt_type[joint] in (BALL_JOINT, FREE_JOINT)
     return bool(not several and model.dof_frictionloss[model.jnt_dofadr[joint]] > 0.0)
 
 
 def dry_frictions(model: mujoco.MjModel) -> Iterator[DryFriction]:
     """Dry friction of hinges and slides."""
-    if disabled(model, "FRICTIONLOSS"):
+    if feature_is_disabled(model, "FRICTIONLOSS"):
         return
-    for j in (j for j in range(model.njnt) if rubs(model, j)):
+    for j in (j for j in range(model.njnt) if has_dry_friction(model, j)):
         first = int(model.jnt_dofadr[j])
         yield DryFriction(label(model, "joint", j), first, float(model.dof_frictionloss[first]))
 
@@ -219,7 +229,7 @@ def _along_tendon(model: mujoco.MjModel, tendon: int) -> tuple[tuple, tuple[floa
 
 
 def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
-    springs, dampers = not disabled(model, "SPRING"), not disabled(model, "DAMPER")
+    springs, dampers = not feature_is_disabled(model, "SPRING"), not feature_is_disabled(model, "DAMPER")
     for t in range(model.ntendon):
         if not is_fixed(model, t):
             continue
@@ -230,7 +240,7 @@ def _tendon_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
             yield JointElement(label(model, "tendon", t), places, factors, stiffness, damping, held, inertia)
 
 
-def controls(model: mujoco.MjModel) -> np.ndarray:
+def constant_controls(model: mujoco.MjModel) -> np.ndarray:
     """Constant controls (nu,): 0, or for a limited control the nearest number in its range."""
     limited = model.actuator_ctrllimited[:, None].astype(bool)
     low, high = np.where(limited, model.actuator_ctrlrange, (-np.inf, np.inf)).T
@@ -253,33 +263,35 @@ def affine_law(model: mujoco.MjModel, actuator: int, control: float) -> np.ndarr
     return law
 
 
-def acts(model: mujoco.MjModel, actuator: int) -> bool:
+def actuator_is_on(model: mujoco.MjModel, actuator: int) -> bool:
     """Whether an actuator is in no group that is switched off; MuJoCo has such switches for groups 0 to 30."""
     group = int(model.actuator_group[actuator])
     return not (0 <= group <= LAST_GROUP and model.opt.disableactuator & (1 << group))
 
 
-def _acting(model: mujoco.MjModel) -> list[int]:
+def _active_actuators(model: mujoco.MjModel) -> list[int]:
     """Actuators that are not switched off."""
-    return [i for i in range(model.nu) if acts(model, i) and not disabled(model, "ACTUATION")]
+    return [i for i in range(model.nu) if actuator_is_on(model, i) and not feature_is_disabled(model, "ACTUATION")]
 
 
 def body_loads(model: mujoco.MjModel, design: mujoco.MjData) -> Iterator[BodyLoad]:
     """Constant forces and moments of the actuators that act on sites."""
-    constant, numbers = controls(model), moving(model)
-    for i in (i for i in _acting(model) if pushes_site(model, i)):
+    constant, numbers = constant_controls(model), moving_bodies(model)
+    for i in (i for i in _active_actuators(model) if pushes_site(model, i)):
         site = int(model.actuator_trnid[i, 0])
         body, axes = int(model.site_bodyid[site]), design.site_xmat[site].reshape(3, 3)
         force = affine_law(model, i, float(constant[i]))[0]
         wrench = force * model.actuator_gear[i].reshape(2, 3) @ axes.T
         if wrench.any() and body in numbers:
-            yield BodyLoad(label(model, "actuator", i), massive(body), vector(design.site_xpos[site]), *wrench)
+            yield BodyLoad(
+                label(model, "actuator", i), body_with_mass(body), three_numbers(design.site_xpos[site]), *wrench
+            )
 
 
 def _actuator_elements(model: mujoco.MjModel) -> Iterator[JointElement]:
     """Actuator forces gain u + bias at constant controls, affine in length and speed of a joint or fixed tendon."""
-    constant = controls(model)
-    for i in (i for i in _acting(model) if not pushes_site(model, i)):
+    constant = constant_controls(model)
+    for i in (i for i in _active_actuators(model) if not pushes_site(model, i)):
         gear, target = float(model.actuator_gear[i, 0]), int(model.actuator_trnid[i, 0])
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
             places, factors, start = _along_tendon(model, target)
@@ -299,18 +311,18 @@ def compensation(model: mujoco.MjModel, body: int) -> float:
     MuJoCo has it among the passive forces, which are none at all without springs and dampers, or among the forces of
     actuators where a joint says so (``actuatorgravcomp``), which are none without actuators.
     """
-    passive = not (disabled(model, "SPRING") and disabled(model, "DAMPER"))
+    passive = not (feature_is_disabled(model, "SPRING") and feature_is_disabled(model, "DAMPER"))
     joints = joints_above(model, body)
     if not (model.body_gravcomp[body] and passive and joints):
         return 0.0
-    actuated = model.nu > 0 and not disabled(model, "ACTUATION")
+    actuated = model.nu > 0 and not feature_is_disabled(model, "ACTUATION")
     return sum(actuated or not model.jnt_actgravcomp[j] for j in joints) / len(joints)
 
 
-def _lifted(model: mujoco.MjModel, design: mujoco.MjData, gravity: np.ndarray) -> Iterator[GroundSpring]:
+def _compensated_loads(model: mujoco.MjModel, design: mujoco.MjData, gravity: np.ndarray) -> Iterator[GroundSpring]:
     """Upward loads at the centres of the bodies whose weight is compensated."""
-    for b in moving(model):
+    for b in moving_bodies(model):
         if model.body_mass[b] and gravity.any() and compensation(model, b) == 1.0:
             load, still = -gravity * float(model.body_gravcomp[b] * model.body_mass[b]), np.zeros(3)
-            point = vector(design.xipos[b])
-            yield GroundSpring(massive(b), point, point, still, still, load)  # type: ignore[arg-type]
+            point = three_numbers(design.xipos[b])
+            yield GroundSpring(body_with_mass(b), point, point, still, still, load)  # type: ignore[arg-type]

@@ -9,7 +9,8 @@ matrix couples them; a stiff constraint magnifies the rounding of places; weight
 where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
 
 Solving for accelerations rounds once more, and the entries of the mass matrix independently of one another, which no
-change of the model's numbers does: that is added (``_solved``). Up to 100 roundings of it were seen, on a car.
+change of the model's numbers does: that is added (``_with_solver_rounding``). Up to 100 roundings of it were seen, on a
+car.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,22 +20,22 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from models.own_model.builds import Equations, Moved, State, as_parsed, forward
-from models.own_model.coordinates import BALL, FREE
-from models.own_model.equalities import joins
+from models.own_model.builds import Equations, Moved, State, as_parsed, forward_state
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
+from models.own_model.equalities import joins_bodies
 from models.own_model.reading import TwinModel
 
-SHARE = 1e-9
+CHANGED_SHARE = 1e-9
 """Changes of numbers: far above their rounding, and small enough for the answer to change in proportion."""
-SAMPLES, SEED = 8, 27
+RANDOM_CHANGES, SEED = 8, 27
 """Random changes, of whose effects the root mean square is taken: by one alone, effects may cancel."""
-RELATIVE = (
+RELATIVE_NUMBERS = (
     *("body_mass", "body_inertia", "body_gravcomp", "jnt_stiffness", "dof_damping", "dof_armature"),
     *("dof_frictionloss", "tendon_stiffness", "tendon_damping", "tendon_armature", "tendon_lengthspring", "wrap_prm"),
     *("actuator_gainprm", "actuator_biasprm", "actuator_gear", "eq_solref", "eq_solimp", "qpos_spring"),
 )
-LENGTHS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
-DIRECTIONS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
+LENGTH_NUMBERS = ("body_pos", "body_ipos", "jnt_pos", "site_pos")
+DIRECTION_NUMBERS = ("body_quat", "body_iquat", "site_quat", "jnt_axis")
 """Numbers of a compiled model: changed by a share of themselves, of the reach, and unit vectors."""
 Law = Callable[[TwinModel], Equations]
 """The file's own model as a function of coordinates and rates: with soft constraints, or with rigid ones."""
@@ -48,17 +49,21 @@ def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Seq
     """
     draw, reach = np.random.default_rng(SEED), reach_of(twin)
     squares = [Moved(*map(np.zeros_like, each)) for each in moved]
-    for _ in range(SAMPLES):
-        move = law(replace(twin, model=changed(twin.model, draw, reach)))
+    for _ in range(RANDOM_CHANGES):
+        move = law(replace(twin, model=changed_model(twin.model, draw, reach)))
         for square, exact, (q, v) in zip(squares, moved, states, strict=True):
             other = move(*_changed_state(twin, draw, q, v))
             for total, there, here in zip(square, other, exact, strict=True):
-                total += ((there - here) / SHARE) ** 2 / SAMPLES
-    by_numbers = [_solved(Moved(*map(np.sqrt, each)), exact) for each, exact in zip(squares, moved, strict=True)]
-    return by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _free(twin, states)))
+                total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
+    by_numbers = [
+        _with_solver_rounding(Moved(*map(np.sqrt, each)), exact) for each, exact in zip(squares, moved, strict=True)
+    ]
+    return (
+        by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _unconstrained_motion(twin, states)))
+    )
 
 
-def _solved(sensitive: Moved, moved: Moved) -> Moved:
+def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:
     """Sensitivities with that of solving M a = f, whose rounding is a relative change of every entry of M.
 
     This is Skeel's componentwise condition, |M^-1| |M| |a| (Higham 2002, Accuracy and Stability of Numerical
@@ -70,7 +75,7 @@ def _solved(sensitive: Moved, moved: Moved) -> Moved:
     return sensitive._replace(acceleration=sensitive.acceleration + solution)
 
 
-def _free(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
+def _unconstrained_motion(twin: TwinModel, states: Sequence[State]) -> list[Moved]:
     """Motion of the file's own model at the states, without its equality constraints."""
     model = copy(twin.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
@@ -91,41 +96,41 @@ def _constrained(sensitive: Moved, free: Moved) -> Moved:
 def reach_of(twin: TwinModel) -> float:
     """Largest distance (m) of a body, a centre of mass or an anchor from the world's origin in the design position."""
     data = mujoco.MjData(twin.model)
-    forward(twin, data, np.zeros(twin.size), np.zeros(twin.size))
+    forward_state(twin, data, np.zeros(twin.size), np.zeros(twin.size))
     places = np.concatenate((data.xpos, data.xipos, data.xanchor, data.site_xpos))
     return float(np.linalg.norm(places, axis=1).max())
 
 
-def changed(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> mujoco.MjModel:
+def changed_model(model: mujoco.MjModel, draw: np.random.Generator, reach: float) -> mujoco.MjModel:
     """A copy of the model in which all numbers that affect motion are changed at random by a small relative amount."""
     model = copy(model)
 
     def unit(shape: tuple[int, ...]) -> np.ndarray:
-        return SHARE * draw.uniform(-1.0, 1.0, shape)
+        return CHANGED_SHARE * draw.uniform(-1.0, 1.0, shape)
 
-    for name in RELATIVE:
+    for name in RELATIVE_NUMBERS:
         numbers = getattr(model, name)
         numbers *= 1.0 + unit(numbers.shape)
-    for name in LENGTHS:
+    for name in LENGTH_NUMBERS:
         numbers = getattr(model, name)
         numbers += reach * unit(numbers.shape)
-    for name in DIRECTIONS:
+    for name in DIRECTION_NUMBERS:
         numbers = getattr(model, name)
         numbers += unit(numbers.shape)
         numbers /= np.linalg.norm(numbers, axis=-1, keepdims=True)
     model.opt.gravity += np.linalg.norm(model.opt.gravity) * unit((3,))
-    for e, size in _ends(model, reach):
+    for e, size in _equality_magnitudes(model, reach):
         model.eq_data[e] += size * unit(size.shape)
     model.body_sameframe[:] = model.site_sameframe[:] = 0
     return model
 
 
-def _ends(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray]]:
+def _equality_magnitudes(model: mujoco.MjModel, reach: float) -> Iterator[tuple[int, np.ndarray]]:
     """For every equality constraint, its index and the magnitudes (k,) of its numbers: positions between bodies, else
     factors."""
     for e in range(model.neq):
         size = np.abs(model.eq_data[e])
-        if joins(model, e):
+        if joins_bodies(model, e):
             size[:6] = np.maximum(size[:6], reach)
             size[6:10] = 1.0
         yield e, size
@@ -136,9 +141,9 @@ def _changed_state(twin: TwinModel, draw: np.random.Generator, q: np.ndarray, v:
     them."""
     model, size = twin.model, np.abs(q)
     for j in range(model.njnt):
-        first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL, FREE))
-        place, shifts = int(model.jnt_qposadr[j]), 3 if model.jnt_type[j] == FREE else 0 if several else 1
+        first, several = int(model.jnt_dofadr[j]), int(model.jnt_type[j] in (BALL_JOINT, FREE_JOINT))
+        place, shifts = int(model.jnt_qposadr[j]), 3 if model.jnt_type[j] == FREE_JOINT else 0 if several else 1
         size[first : first + shifts] += np.abs(model.qpos0[place : place + shifts])
         size[first + shifts : first + shifts + 3 * several] += 1.0
-    share = SHARE * draw.uniform(-1.0, 1.0, (2, twin.size))
+    share = CHANGED_SHARE * draw.uniform(-1.0, 1.0, (2, twin.size))
     return q + size * share[0], v * (1.0 + share[1])

@@ -1,4 +1,4 @@
-"""The vehicle that a scene names: one that comes with twinrig, a vehicle file in TOML, or a car in MJCF."""
+"""The vehicle that a scene names: one that comes with twinrig, a vehicle file in TOML, or a car in MJCF_EXTENSION."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from models.core.scene_file import existing
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 
-MJCF = ".xml"
+MJCF_EXTENSION = ".xml"
 
 
 def scene_vehicle(
@@ -17,8 +17,8 @@ def scene_vehicle(
     ``file`` and ``place`` say who asked for it, for the message if there is none. reduced, towing : may a vehicle file
     have [reduced], and may it tow? Raises InputError.
     """
-    if name.endswith(MJCF):
-        from models.own_model.car import car
+    if name.endswith(MJCF_EXTENSION):
+        from models.own_model.car import vehicle_of_file
 
-        return car(existing(name, Path(folder), file, place))
+        return vehicle_of_file(existing(name, Path(folder), file, place))
     return load_vehicle(name, folder, file, place, reduced, towing)

@@ -4,24 +4,24 @@ import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.constraints import plain_constraints, satisfying
-from models.own_model.coordinates import BALL, FREE, SLIDE
+from models.own_model.constraints import plain_constraints, satisfying_state
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.equalities import tie_rows
 from models.own_model.reading import TwinModel
 
-COUNT = 100
+STATE_COUNT = 100
 SEED = 26
-ANGLE, SHIFT, SPEED, TILT = np.pi, 0.5, 1.0, 1.2
-"""rad, m, and rad/s or m/s: what a coordinate without a range may reach; TILT (rad): the three angles of what turns
-without limit, the second of which is singular at a quarter turn."""
+LARGEST_ANGLE, LARGEST_SHIFT, LARGEST_SPEED, LARGEST_TILT = np.pi, 0.5, 1.0, 1.2
+"""rad, m, and rad/s or m/s: what a coordinate without a range may reach; LARGEST_TILT (rad): the three angles of what
+turns without limit, the second of which is singular at a quarter turn."""
 
-STEEPEST = 1.45
+STEEPEST_MIDDLE_ANGLE = 1.45
 """rad: how near the middle one of three angles comes to a quarter turn."""
-NEARER = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
+WAY_SHARES = (1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)
 """Shares of a random way from the design position, of which the first is taken at which constraints can be met."""
 UNMET_GAP = 1e-9
 """rad, m: gap of couplings that no coordinates satisfy all at once."""
-UNMET = "constraints cannot be satisfied all at once by coordinates in their ranges"
+UNMET_REASON = "constraints cannot be satisfied all at once by coordinates in their ranges"
 
 
 def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
@@ -30,10 +30,10 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
     Those that constraints tie go to the nearest place, and the nearest rate, that satisfies them. RunFailed where no
     state does.
     """
-    draw, (low, high) = np.random.default_rng(seed), bounds(twin.model)
-    q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-SPEED, SPEED, (count, len(low)))
+    draw, (low, high) = np.random.default_rng(seed), drawing_bounds(twin.model)
+    q, v = draw.uniform(low, high, (count, len(low))), draw.uniform(-LARGEST_SPEED, LARGEST_SPEED, (count, len(low)))
     if twin.driven.connections:
-        return _connected(twin, q, v)
+        return _constrained_states(twin, q, v)
     rows, offsets = tie_rows(twin.driven.couplings, twin.size)
     if not len(rows):
         return q, v
@@ -46,55 +46,58 @@ def random_states(twin: TwinModel, count: int, seed: int = SEED) -> tuple[np.nda
     return q, v
 
 
-def _connected(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _constrained_states(twin: TwinModel, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States (count, n) that satisfy the constraints between bodies, found from random ones; a state moves towards the
     design position where no solution is near."""
-    constraints, (low, high) = plain_constraints(twin), limits(twin.model)
+    constraints, (low, high) = plain_constraints(twin), file_limits(twin.model)
     middle = np.clip(0.0, low, high)
 
     def nearest(place: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        for share in NEARER:
-            state = satisfying(constraints, middle + share * (place - middle), rate)
+        for share in WAY_SHARES:
+            state = satisfying_state(constraints, middle + share * (place - middle), rate)
             if state is not None and ((low <= state[0]) & (state[0] <= high)).all():
                 return state
-        raise RunFailed("twin", UNMET)
+        raise RunFailed("twin", UNMET_REASON)
 
     states = [nearest(*each) for each in zip(q, v, strict=True)]
     return np.array([place for place, _ in states]), np.array([rate for _, rate in states])
 
 
-def bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+def drawing_bounds(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates (n,) between which random states are drawn."""
-    high = np.full(model.nv, ANGLE)
+    high = np.full(model.nv, LARGEST_ANGLE)
     low = -high
     for j in range(model.njnt):
         first, place = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
-        if model.jnt_type[j] in (FREE, BALL):
-            turn = first + (3 if model.jnt_type[j] == FREE else 0)
+        if model.jnt_type[j] in (FREE_JOINT, BALL_JOINT):
+            turn = first + (3 if model.jnt_type[j] == FREE_JOINT else 0)
             reach = model.jnt_range[j, 1] - model.jnt_margin[j] if model.jnt_limited[j] else np.inf
-            high[first:turn], high[turn : turn + 3] = SHIFT, min(TILT, reach / np.sqrt(3.0))
+            high[first:turn], high[turn : turn + 3] = LARGEST_SHIFT, min(LARGEST_TILT, reach / np.sqrt(3.0))
             low[first : turn + 3] = -high[first : turn + 3]
         elif model.jnt_limited[j]:
             margin = min(float(model.jnt_margin[j]), 0.5 * float(np.ptp(model.jnt_range[j])))
             low[first], high[first] = model.jnt_range[j] - model.qpos0[place] + (margin, -margin)
-        elif model.jnt_type[j] == SLIDE:
-            low[first], high[first] = -SHIFT, SHIFT
+        elif model.jnt_type[j] == SLIDE_JOINT:
+            low[first], high[first] = -LARGEST_SHIFT, LARGEST_SHIFT
     return low, high
 
 
-def limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+def file_limits(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates (n,) of the ranges in the file, infinite where there is no range.
 
     The middle one of three angles keeps away from a quarter turn all the same.
     """
-    low, high = bounds(model)
+    low, high = drawing_bounds(model)
     for j in range(model.njnt):
-        first, several = int(model.jnt_dofadr[j]), model.jnt_type[j] in (FREE, BALL)
-        free = model.jnt_type[j] == FREE
+        first, several = int(model.jnt_dofadr[j]), model.jnt_type[j] in (FREE_JOINT, BALL_JOINT)
+        free = model.jnt_type[j] == FREE_JOINT
         if not model.jnt_limited[j] or free:
             of = slice(first, first + (6 if free else 3 if several else 1))
             low[of], high[of] = -np.inf, np.inf
         if several:
             middle = first + (4 if free else 1)
-            low[middle], high[middle] = max(low[middle], -STEEPEST), min(high[middle], STEEPEST)
+            low[middle], high[middle] = (
+                max(low[middle], -STEEPEST_MIDDLE_ANGLE),
+                min(high[middle], STEEPEST_MIDDLE_ANGLE),
+            )
     return low, high

@@ -7,8 +7,8 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import ENGINES
 from models.own_model.control_table import constant_leg
-from models.own_model.elements import short
-from models.own_model.path import DISTURBED, DURATION, blown_up, path_by, rows_alike, steps_of_path
+from models.own_model.elements import two_digit_text
+from models.own_model.path import DISTURBANCE, PATH_DURATION, blown_up, path_by, rows_alike, steps_of_path
 from models.own_model.reading import TwinModel
 from models.own_model.states import random_states
 
@@ -28,9 +28,12 @@ class PathGap:
         """One line of text for the terminal."""
         if self.failed:
             return f"paths of both files from one state are not compared: {self.failed}"
-        until = "" if self.horizon >= DURATION else f", where a disturbance of {DISTURBED:g} makes them different"
+        until = (
+            "" if self.horizon >= PATH_DURATION else f", where a disturbance of {DISTURBANCE:g} makes them different"
+        )
         return (
-            f"paths of both files from one state, in Exudyn: {short(self.distance)} apart up to {self.horizon:.3g} s"
+            f"paths of both files from one state, in Exudyn: {two_digit_text(self.distance)} apart up "
+            f"to {self.horizon:.3g} s"
             f"{until}; most at {self.worst}"
         )
 
@@ -39,12 +42,12 @@ def paths_apart(first: TwinModel, second: TwinModel) -> PathGap:
     """Difference between two files' paths over 1 s, at the step of the first file; both must have the same names of
     coordinates."""
     steps, (q,), (v,) = steps_of_path(first), *random_states(first, 1)
-    step, order = DURATION / steps, [first.names.index(name) for name in second.names]
+    step, order = PATH_DURATION / steps, [first.names.index(name) for name in second.names]
     legs = [constant_leg(twin, steps) for twin in (first, second)]
     try:
         with np.errstate(all="ignore"):  # what blows up is told
             path = path_by(legs[0], ENGINES[0], (q, v), step)
-            disturbed = path_by(legs[0], ENGINES[0], (q + DISTURBED, v), step)
+            disturbed = path_by(legs[0], ENGINES[0], (q + DISTURBANCE, v), step)
             other = path_by(legs[1], ENGINES[0], (q[order], v[order]), step)
     except RunFailed as error:
         return PathGap(0.0, np.nan, "", error.reason)

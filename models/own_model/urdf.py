@@ -16,9 +16,9 @@ from models.own_model.file import ModelFile
 from models.own_model.names import label
 from models.vehicles.spatial import steiner
 
-SAME = 1e-6
+PARSER_TOLERANCE = 1e-6
 """Relative: MuJoCo's parser keeps all digits, yet principal axes cost some."""
-MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+MOVING_JOINT_TYPES = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
 @dataclass(frozen=True)
@@ -65,15 +65,15 @@ class _Mass:
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 
-def misread(file: ModelFile) -> list[Misread]:
+def misread_numbers(file: ModelFile) -> list[Misread]:
     """Numbers of a URDF that differ in MuJoCo's compiled model, each with both values."""
     root = ElementTree.fromstring(file.document.path.read_bytes())
     model, design = file.twin.model, mujoco.MjData(file.twin.model)
     design.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, design)
-    links, joints = _placed(root, file.document.path.name)
+    links, joints = _links_in_place(root, file.document.path.name)
     rows = list[Misread]()
-    for name, expected in _masses(root, links, file.document.path.name).items():
+    for name, expected in _masses_of_groups(root, links, file.document.path.name).items():
         rows += _compared_mass(model, design, name, expected)
     for name, (anchor, axis) in joints.items():
         rows += _compared_joint(model, design, name, anchor, axis)
@@ -91,7 +91,7 @@ def _compared_mass(model: mujoco.MjModel, design: mujoco.MjData, name: str, expe
         ("centre of mass", "m", expected.centre, design.xipos[body]),
         ("inertia", "kg m^2", expected.inertia, tensor),
     )
-    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _same(a, b, kind)]
+    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)]
 
 
 def _compared_joint(
@@ -102,16 +102,18 @@ def _compared_joint(
         return []
     owner = label(model, "joint", joint)
     pairs = (("axis", "", axis, design.xaxis[joint]), ("anchor", "m", anchor, design.xanchor[joint]))
-    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _same(a, b, kind)]
+    return [Misread(kind, owner, unit, a, b.copy()) for kind, unit, a, b in pairs if not _equal_numbers(a, b, kind)]
 
 
-def _same(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
+def _equal_numbers(expected: np.ndarray, parsed: np.ndarray, kind: str) -> bool:
     least = 1.0 if kind in ("axis", "anchor", "centre of mass") else 0.0
     size = max(np.abs(expected).max(), np.abs(parsed).max(), least)
-    return bool(np.abs(expected - parsed).max() <= SAME * size)
+    return bool(np.abs(expected - parsed).max() <= PARSER_TOLERANCE * size)
 
 
-def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
+def _links_in_place(
+    root: ElementTree.Element, file: str
+) -> tuple[dict[str, _Link], dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Links by name in the design position; for hinges and slides by name, anchors and axes in space."""
     joints = list(root.iter("joint"))
     children = {_end(joint, "child") for joint in joints}
@@ -127,34 +129,34 @@ def _placed(root: ElementTree.Element, file: str) -> tuple[dict[str, _Link], dic
             return links, axes  # a loop, which MuJoCo's parser has refused
         for joint in ready:
             above, child = links[_end(joint, "parent")], _end(joint, "child")
-            shift, turn = _origin(joint, file)
-            moves = joint.get("type") in MOVING
+            shift, turn = _origin_of(joint, file)
+            moves = joint.get("type") in MOVING_JOINT_TYPES
             link = _Link(above.place + above.axes @ shift, above.axes @ turn, child if moves else above.group)
             links[child] = link
-            if joint.get("type") in MOVING[:3]:
-                axis = _numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), file)
+            if joint.get("type") in MOVING_JOINT_TYPES[:3]:
+                axis = _numbers_in_attribute(joint.find("axis"), "xyz", (1.0, 0.0, 0.0), file)
                 axes[joint.get("name", "")] = link.place, link.axes @ (axis / np.linalg.norm(axis))
         waiting = [joint for joint in waiting if joint not in ready]
     return links, axes
 
 
-def _masses(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
+def _masses_of_groups(root: ElementTree.Element, links: dict[str, _Link], file: str) -> dict[str, _Mass]:
     """Mass, centre and inertia of each group of links that are fixed to one another, by the name of its moving link."""
     sums = dict[str, _Mass]()
     for element in root.iter("link"):
         inertial, link = element.find("inertial"), links.get(element.get("name", ""))
         if inertial is None or link is None:
             continue
-        shift, turn = _origin(inertial, file)
-        mass = float(_numbers(inertial.find("mass"), "value", (0.0,), file)[0])
-        tensor, axes = _tensor(inertial.find("inertia"), file), link.axes @ turn
+        shift, turn = _origin_of(inertial, file)
+        mass = float(_numbers_in_attribute(inertial.find("mass"), "value", (0.0,), file)[0])
+        tensor, axes = _inertia_tensor(inertial.find("inertia"), file), link.axes @ turn
         sums.setdefault(link.group, _Mass()).add(mass, link.place + link.axes @ shift, axes @ tensor @ axes.T)
     return sums
 
 
-def _tensor(element: ElementTree.Element | None, file: str) -> np.ndarray:
+def _inertia_tensor(element: ElementTree.Element | None, file: str) -> np.ndarray:
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    xx, xy, xz, yy, yz, zz = (float(_numbers(element, name, (0.0,), file)[0]) for name in names)
+    xx, xy, xz, yy, yz, zz = (float(_numbers_in_attribute(element, name, (0.0,), file)[0]) for name in names)
     return np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
 
@@ -163,18 +165,20 @@ def _end(joint: ElementTree.Element, which: str) -> str:
     return "" if end is None else end.get("link", "")
 
 
-def _origin(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
+def _origin_of(element: ElementTree.Element, file: str) -> tuple[np.ndarray, np.ndarray]:
     """Translation (3,) and rotation (3, 3) of an <origin>."""
     origin = element.find("origin")
-    roll, pitch, yaw = _numbers(origin, "rpy", (0.0, 0.0, 0.0), file)
+    roll, pitch, yaw = _numbers_in_attribute(origin, "rpy", (0.0, 0.0, 0.0), file)
     (sa, sb, sc), (ca, cb, cc) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
     x = np.array(((1.0, 0.0, 0.0), (0.0, ca, -sa), (0.0, sa, ca)))
     y = np.array(((cb, 0.0, sb), (0.0, 1.0, 0.0), (-sb, 0.0, cb)))
     z = np.array(((cc, -sc, 0.0), (sc, cc, 0.0), (0.0, 0.0, 1.0)))
-    return _numbers(origin, "xyz", (0.0, 0.0, 0.0), file), z @ y @ x
+    return _numbers_in_attribute(origin, "xyz", (0.0, 0.0, 0.0), file), z @ y @ x
 
 
-def _numbers(element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str) -> np.ndarray:
+def _numbers_in_attribute(
+    element: ElementTree.Element | None, name: str, default: tuple[float, ...], file: str
+) -> np.ndarray:
     """Numbers in an attribute; InputError where they are not numbers, or not as many as wanted."""
     text = None if element is None else element.get(name)
     if text is None:

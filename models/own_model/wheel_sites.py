@@ -15,11 +15,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.own_model.xml_guard import Document
 
-NAMED = re.compile(r"(?:tyre|hub)[ _.:-]*(.*)", re.IGNORECASE)
-EXAMPLE = '<site name="tyre front_left" pos="X Y Z" user="STIFFNESS DAMPING CORNERING"/>'
-SAME, APART = 1e-6, 0.2
+WHEEL_SITE_PATTERN = re.compile(r"(?:tyre|hub)[ _.:-]*(.*)", re.IGNORECASE)
+EXAMPLE_SITE = '<site name="tyre front_left" pos="X Y Z" user="STIFFNESS DAMPING CORNERING"/>'
+SAME_AXLE_DISTANCE, AXLE_SEPARATION = 1e-6, 0.2
 """m: wheels of one axle lie so close along x, and those of two axles at least so far apart."""
-ABREAST = 2
+MOST_WHEELS_PER_AXLE = 2
 """Wheels of an axle at the most."""
 
 
@@ -44,9 +44,11 @@ def wheel_sites(model: mujoco.MjModel, design: mujoco.MjData, document: Document
 
     design : data of the model in the design position, with kinematics computed.
     """
-    sites = {s: match[1] for s in range(model.nsite) if (match := NAMED.fullmatch(model.site(s).name))}
+    sites = {s: match[1] for s in range(model.nsite) if (match := WHEEL_SITE_PATTERN.fullmatch(model.site(s).name))}
     if not sites:
-        said = f"no site is named as a tyre or a hub: a vehicle needs one at the centre of every wheel, as {EXAMPLE}"
+        said = (
+            f"no site is named as a tyre or a hub: a vehicle needs one at the centre of every wheel, as {EXAMPLE_SITE}"
+        )
         raise InputError(document.path.name, "worldbody", None, said)
     for s, name in sites.items():
         _check_site(model, design, document, s, name, list(sites.values()).count(name) > 1)
@@ -92,12 +94,16 @@ def _axles(
     axles, x = [ordered[:1]], design.site_xpos[:, 0]
     for before, site in pairwise(ordered):
         apart = round(float(x[before] - x[site]), 9)
-        if SAME < apart < APART:
+        if SAME_AXLE_DISTANCE < apart < AXLE_SEPARATION:
             other = model.site(before).name
             _refuse(
-                model, document, site, apart, f"m behind {other!r}: one axle within {SAME:g} m, or {APART:g} m apart"
+                model,
+                document,
+                site,
+                apart,
+                f"m behind {other!r}: one axle within {SAME_AXLE_DISTANCE:g} m, or {AXLE_SEPARATION:g} m apart",
             )
-        if apart > SAME:
+        if apart > SAME_AXLE_DISTANCE:
             axles.append([])
         axles[-1].append(site)
     for sites in axles:
@@ -109,14 +115,20 @@ def _axles(
 def _check_axle(design: mujoco.MjData, document: Document, model: mujoco.MjModel, sites: list[int]) -> None:
     """Require that an axle has a left and a right wheel, or one wheel in the middle."""
     y, at = design.site_xpos[sites, 1], f"the axle at x = {design.site_xpos[sites[0], 0]:.6g} m"
-    if len(sites) > ABREAST:
+    if len(sites) > MOST_WHEELS_PER_AXLE:
         names = ", ".join(repr(model.site(s).name) for s in sites)
-        _refuse(model, document, sites[-1], None, f"{at} has {len(sites)} wheels, {names}: {ABREAST} at the most")
-    if len(sites) == ABREAST and not y[0] > 0.0 > y[1]:
+        _refuse(
+            model,
+            document,
+            sites[-1],
+            None,
+            f"{at} has {len(sites)} wheels, {names}: {MOST_WHEELS_PER_AXLE} at the most",
+        )
+    if len(sites) == MOST_WHEELS_PER_AXLE and not y[0] > 0.0 > y[1]:
         _refuse(
             model, document, sites[-1], y.tolist(), f"{at} must have a left wheel, y above 0, and a right one, below"
         )
-    if len(sites) == 1 and abs(y[0]) > SAME:
+    if len(sites) == 1 and abs(y[0]) > SAME_AXLE_DISTANCE:
         _refuse(model, document, sites[0], float(y[0]), f"m is y of the only wheel of {at}: its partner is missing")
 
 
@@ -127,6 +139,6 @@ def _tyre_numbers(model: mujoco.MjModel, document: Document, site: int) -> tuple
     numbers[: len(given)] = given
     if not np.isfinite(numbers).all() or (numbers < 0.0).any() or not numbers[0] > 0.0:
         allowed = "user must hold the tyre's stiffness in N/m above 0, then damping in N s/m and cornering in N/rad: "
-        _refuse(model, document, site, numbers.tolist(), f"{allowed}{EXAMPLE}")
+        _refuse(model, document, site, numbers.tolist(), f"{allowed}{EXAMPLE_SITE}")
     stiffness, damping, cornering = numbers.tolist()
     return stiffness, damping, cornering

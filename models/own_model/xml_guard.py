@@ -11,14 +11,14 @@ from xml.parsers import expat
 
 from models.core.errors import InputError
 
-LARGEST = 20_000_000
+LARGEST_FILE = 20_000_000
 """Bytes of a file."""
-DEEPEST = 8
+DEEPEST_INCLUDE = 8
 """Includes within includes."""
-MOST = 2000
+MOST_COPIES = 2000
 """Copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an attack."""
-ROOTS = {"mujoco": "MJCF", "mujocoinclude": "MJCF", "robot": "URDF"}
-PLUGINS = ("plugin", "extension")
+FORMAT_OF_ROOT = {"mujoco": "MJCF", "mujocoinclude": "MJCF", "robot": "URDF"}
+PLUGIN_TAGS = ("plugin", "extension")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class XmlElement:
     attributes: dict[str, str]
     file: str
     line: int
-    around: tuple[str, ...]
+    enclosing_tags: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -88,47 +88,47 @@ class _Folders(NamedTuple):
     base: Path
 
 
-def guarded(path: Path) -> Document:
+def checked_document(path: Path) -> Document:
     """The file's elements, after checks; InputError for content that must not reach the parser."""
     folder, elements = path.resolve().parent, list[XmlElement]()
-    _read(path, _Folders(folder, folder), elements, 0)
+    _read_elements(path, _Folders(folder, folder), elements, 0)
     root = elements[0].tag
-    if root not in ROOTS:
+    if root not in FORMAT_OF_ROOT:
         allowed = "must be <mujoco> (MJCF) or <robot> (URDF)"
         raise InputError(path.name, f"line {elements[0].line}", f"<{root}>", allowed)
-    return Document(path, ROOTS[root], tuple(elements))
+    return Document(path, FORMAT_OF_ROOT[root], tuple(elements))
 
 
-def _content(path: Path) -> bytes:
+def _file_content(path: Path) -> bytes:
     try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(str(path), "", path.stat().st_size, f"bytes: a model may have {LARGEST} at the most")
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(str(path), "", path.stat().st_size, f"bytes: a model may have {LARGEST_FILE} at the most")
         return path.read_bytes()
     except OSError as error:
         raise InputError(str(path), "", None, f"cannot be read: {error.strerror or error}") from None
 
 
-def _read(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
-    for element in _Reader(path).read(_content(path)):
+def _read_elements(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
+    for element in _Reader(path).read(_file_content(path)):
         elements.append(element)
         place = f"line {element.line}"
-        if element.tag in PLUGINS or "plugin" in element.attributes:
+        if element.tag in PLUGIN_TAGS or "plugin" in element.attributes:
             raise InputError(path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
         if element.tag in ("include", "model") and "file" in element.attributes:
-            _include(path, folders, element, elements, depth)
+            _read_included(path, folders, element, elements, depth)
         _check_counts(path, element, place)
 
 
-def _include(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
+def _read_included(path: Path, folders: _Folders, element: XmlElement, elements: list[XmlElement], depth: int) -> None:
     """Read a file that an element includes or attaches; InputError if it lies outside the allowed folder."""
     name, place = element.attributes["file"], f"line {element.line}"
     target = (folders.base / name).resolve()
     if not target.is_relative_to(folders.allowed):
         raise InputError(path.name, place, name, f"<{element.tag}> must name a file in the folder of the model")
-    if depth >= DEEPEST:
-        raise InputError(path.name, place, name, f"includes go {DEEPEST} deep at the most")
+    if depth >= DEEPEST_INCLUDE:
+        raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
     base = target.parent if element.tag == "model" else folders.base
-    _read(target, _Folders(folders.allowed, base), elements, depth + 1)
+    _read_elements(target, _Folders(folders.allowed, base), elements, depth + 1)
 
 
 def _check_counts(path: Path, element: XmlElement, place: str) -> None:
@@ -136,7 +136,7 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
         return
     if element.tag == "size":
         for name in ("memory", "nstack", "njmax", "nconmax", "nuserdata"):
-            if name in element.attributes and not _modest(element.attributes[name]):
+            if name in element.attributes and not _memory_is_modest(element.attributes[name]):
                 raise InputError(path.name, place, element.attributes[name], f"<size> asks for too much {name}")
         return
     product = 1.0
@@ -145,11 +145,11 @@ def _check_counts(path: Path, element: XmlElement, place: str) -> None:
             product *= max(1.0, abs(float(text)))
         except ValueError:
             raise InputError(path.name, place, text, "count must be whole numbers") from None
-    if not product <= MOST:
-        raise InputError(path.name, place, element.attributes["count"], f"asks for more than {MOST} copies")
+    if not product <= MOST_COPIES:
+        raise InputError(path.name, place, element.attributes["count"], f"asks for more than {MOST_COPIES} copies")
 
 
-def _modest(text: str) -> bool:
+def _memory_is_modest(text: str) -> bool:
     """Whether an amount of memory, in MuJoCo's notation such as 100M, is below 4 GB."""
     units = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
     number, unit = (text[:-1], units[text[-1:].upper()]) if text[-1:].upper() in units else (text, 1)

@@ -29,20 +29,20 @@ from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
 Triple = tuple[float, float, float]
-SIGNS = (1.0, -1.0)
+SIDE_SIGNS = (1.0, -1.0)
 """Of the right wheel, and of the left one seen in a mirror."""
-ROLLS = 3
+ROLL_ITERATIONS = 3
 """Times that the roll angle is found anew with the approaches of both wheels."""
-TURNS = 2
+SPIN_ITERATIONS = 2
 """Times that the speed of spin is found anew with the exact loads of the patches."""
 ITERATIONS = 60
-SLIDE = 0.05
+SPIN_SEARCH_SHARE = 0.05
 """Share of the nominal speed of spin within which the one without moment is looked for."""
-CELLS = 31
+CELLS_PER_STRIP = 31
 """Strips of a patch, and cells along each."""
-PRECISION = 1e-7
+LOAD_PRECISION = 1e-7
 """Relative, of the load that a wheel carries."""
-CLIMBED = 2e-3
+CLIMBING_DEPTH = 2e-3
 """Distance (m) of a touch below the flange's tip from which on a wheel has left its rail's side."""
 
 
@@ -126,19 +126,19 @@ class LoadedWheel:
     wheel.
 
     pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
-    known. approach : vertical (m). lifted : vertical part of the creep forces, upwards on the rail (N). normal : that
-    of the normal forces (N). moment : of the creep forces about the axle (N m).
+    known. approach : vertical (m). creep_lift : vertical part of the creep forces, upwards on the rail (N). normal :
+    that of the normal forces (N). moment : of the creep forces about the axle (N m).
     """
 
     pose: Pose
     touches: list[TouchingPlace]
     creepages: list[Triple]
-    pressed: NormalContact
+    normal_contact: NormalContact
     approach: float
     normal: float
     forces: Sequence[Triple] = ()
     shares: Sequence[Share] = ()
-    lifted: float = 0.0
+    creep_lift: float = 0.0
     moment: float = 0.0
 
     @property
@@ -150,20 +150,20 @@ class LoadedWheel:
 
     def part(self, touch: TouchingPlace) -> PatchPressure | None:
         """Pressure of one patch by the simplified theory; None if the theory finds no contact there."""
-        return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
+        return next((part for part in self.normal_contact.patches if part.patch is touch.patch), None)
 
 
 @dataclass(frozen=True, eq=False)
 class WheelsetContact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
+    0 for a smooth contact. cell_factor : how many times as large as usual cells are, which tells their error."""
 
     side: WheelAndRail
     load: float
     speed: float
     friction: float = 0.0
     pair: MaterialPair = MaterialPair()  # noqa: RUF009 - a frozen value
-    coarser: float = 1.0
+    cell_factor: float = 1.0
 
     def at(self, shift: float, yaw: float = 0.0) -> WheelsetPlacement:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
@@ -175,27 +175,29 @@ class WheelsetContact:
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
         pose = touching_pose(self.side, shift, yaw)
         level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
-        for _ in range(ROLLS):
+        for _ in range(ROLL_ITERATIONS):
             right, left = wheels = self._both_wheels(pose, rolling)
             span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * self.side.wheelset.arm
             pose = replace(pose, roll=level + (right.approach - left.approach) / span)
             if self.friction > 0.0:
                 rolling = self._free_spin(wheels)
         wheels = self._both_wheels(pose, rolling)
-        for _ in range(TURNS):
+        for _ in range(SPIN_ITERATIONS):
             wheels = [self._with_exact_normal(wheel) for wheel in wheels]
             if self.friction == 0.0:
                 break
             rolling = self._free_spin(wheels)
             wheels = [self._at_other_spin(wheel, rolling) for wheel in wheels]
-        return _standing(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
+        return _standing_placement(WheelsetPlacement(shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels)))
 
     def _both_wheels(self, pose: Pose, spin: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
-        return [self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin) for sign in SIGNS]
+        return [
+            self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin) for sign in SIDE_SIGNS
+        ]
 
     def _wheel(self, wheel_pose: Pose, spin: float) -> LoadedWheel:
         pose = replace(wheel_pose, fall=self.side.clearance(wheel_pose))
@@ -214,7 +216,7 @@ class WheelsetContact:
 
         def by_normal(normal: float) -> LoadedWheel:
             shares, approach = press_exactly(
-                patches, approximate.pressed.patches, normal, approximate.approach, self.pair, self.coarser
+                patches, approximate.normal_contact.patches, normal, approximate.approach, self.pair, self.cell_factor
             )
             return replace(approximate, shares=shares, approach=approach, normal=normal)
 
@@ -225,9 +227,9 @@ class WheelsetContact:
         wheel for a vertical part (N) of the normal forces, which is iterated from ``normal``."""
         for _ in range(ITERATIONS):
             wheel = self._rolled(by_normal(normal))
-            if abs(normal - wheel.lifted - self.load) < PRECISION * self.load:
+            if abs(normal - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
                 return wheel
-            normal *= self.load / (normal - wheel.lifted)
+            normal *= self.load / (normal - wheel.creep_lift)
         raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
 
     def _free_spin(self, wheels: Sequence[LoadedWheel]) -> float:
@@ -238,7 +240,9 @@ class WheelsetContact:
             return sum(self._at_other_spin(wheel, spin).moment for wheel in wheels)
 
         rolling = -self.speed / self.side.wheelset.radius
-        return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
+        return float(
+            brentq(moment, rolling * (1.0 - SPIN_SEARCH_SHARE), rolling * (1.0 + SPIN_SEARCH_SHARE), xtol=1e-9)
+        )
 
     def _at_other_spin(self, wheel: LoadedWheel, spin: float) -> LoadedWheel:
         """The wheel with unchanged normal contact at another speed of spin (rad/s)."""
@@ -253,13 +257,13 @@ class WheelsetContact:
             if part is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
-            alone = replace(wheel.pressed, patches=(replace(part, load=load),))
-            creep = roll(alone, self.friction, *creepage, cells=round(CELLS / self.coarser))
+            alone = replace(wheel.normal_contact, patches=(replace(part, load=load),))
+            creep = roll(alone, self.friction, *creepage, cells=round(CELLS_PER_STRIP / self.cell_factor))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
-        moment = sum(float(axle @ _moments(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
-        return replace(wheel, forces=forces, lifted=lifted, moment=moment)
+        moment = sum(float(axle @ _patch_moment(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
+        return replace(wheel, forces=forces, creep_lift=lifted, moment=moment)
 
     def _creepage(self, pose: Pose, touch: TouchingPlace, spin: float) -> Triple:
         """Creepages and spin (1/m) at a point of first touch."""
@@ -267,7 +271,7 @@ class WheelsetContact:
             return 0.0, 0.0, 0.0
         axle, place = pose.turn[:, 1], self._arm(pose, touch)
         velocity = spin * np.cross(axle, place) + np.array([self.speed, 0.0, 0.0])
-        across, into = _axes(touch)
+        across, into = _surface_axes(touch)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
@@ -303,7 +307,7 @@ class WheelsetContact:
         y, x = (float(np.average(values, weights=loads)) for values in zip(*centres, strict=True))
         fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
         mz = sum(
-            float(_axes(touch)[1] @ _moments(self._arm(wheel.pose, patch) - start, patch, force))
+            float(_surface_axes(touch)[1] @ _patch_moment(self._arm(wheel.pose, patch) - start, patch, force))
             for patch, _, force, _ in rows
         )
         boxes = np.array([share.box for *_, share in rows])
@@ -334,11 +338,11 @@ class WheelsetContact:
         )
 
 
-def _standing(placed: WheelsetPlacement) -> WheelsetPlacement:
+def _standing_placement(placed: WheelsetPlacement) -> WheelsetPlacement:
     """The contact unchanged; an error if a wheel stands on the tip of its flange."""
     for name, places in (("right", placed.right), ("left", placed.left)):
         least = min(place.below_tip for place in places)
-        if least < CLIMBED:
+        if least < CLIMBING_DEPTH:
             raise RunFailed(
                 "contact table",
                 f"at {1e3 * placed.shift:g} mm the {name} wheel has climbed its flange and "
@@ -353,14 +357,14 @@ def rolling_radius_difference(placed_at: WheelsetPlacement) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def _axes(touch: TouchingPlace) -> tuple[Array, Array]:
+def _surface_axes(touch: TouchingPlace) -> tuple[Array, Array]:
     """Unit vectors along the rail's surface and along its inward normal, in the track's axes."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _moments(lever: Array, touch: TouchingPlace, force: Triple) -> Array:
+def _patch_moment(lever: Array, touch: TouchingPlace, force: Triple) -> Array:
     """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
     to the patch."""
-    across, into = _axes(touch)
+    across, into = _surface_axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from models.rail.equations import Equations, slopes
+from models.rail.equations import Equations, rate_jacobian
 from models.rail.wheelset import Wheelset
 
 SLOW_SPEED = 0.2
@@ -32,21 +32,21 @@ def uncertainty(kind: type[Equations], wheelset: Wheelset, speed: float) -> floa
     """Change (1/s) of the hunting eigenvalue when slopes are taken over twice the distance; NaN without a hunting
     mode."""
     equations = kind(wheelset, speed, "linear")
-    wide = np.linalg.eigvals(slopes(equations.rates, equations.rest, 2.0))
-    return float(abs(hunting(wide) - hunting(np.linalg.eigvals(equations.state_matrix))))
+    wide = np.linalg.eigvals(rate_jacobian(equations.rates, equations.rest, 2.0))
+    return float(abs(hunting_eigenvalue(wide) - hunting_eigenvalue(np.linalg.eigvals(equations.state_matrix))))
 
 
-def growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def largest_growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the eigenvalues at a speed (m/s), as an argument for ``linear.critical_speed``."""
     return float(values(kind, wheelset, speed).real.max())
 
 
-def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
+def root_locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
     """Eigenvalues (speeds, 9) in 1/s at each speed, for a root locus."""
     return np.array([values(kind, wheelset, float(speed)) for speed in speeds])
 
 
-def hunting(values: np.ndarray) -> np.ndarray:
+def hunting_eigenvalue(values: np.ndarray) -> np.ndarray:
     """Eigenvalue of the hunting mode: among eigenvalues (..., 9) with positive imaginary part, the least damped one;
     NaN if there is none."""
     oscillates = np.where(values.imag > 0.0, values.real, -math.inf)

@@ -52,14 +52,14 @@ class Ledger:
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
-def ledger(equations: Equations, path: WheelsetPath) -> Ledger:
+def energy_ledger(equations: Equations, path: WheelsetPath) -> Ledger:
     """Energy balance along a path computed by RK4, of which every step must be recorded."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
     for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
         rates, powers = rates_and_powers(equations, start + ahead * step * rates)
         done[1:] += weight / 6.0 * step * powers
-    return Ledger(path.times, *energies(equations, path.states), *done.cumsum(axis=0).T)
+    return Ledger(path.times, *energies_at_states(equations, path.states), *done.cumsum(axis=0).T)
 
 
 def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
@@ -67,20 +67,20 @@ def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]
     rates, contacts = equations.at(states)
     names = "elastic_power", "fx", "damping_power", "power"
     elastic, ahead, damping, creep = (-contacts[name].sum(axis=1) for name in names)
-    drive, dampers = equations.speed * ahead, _suspension(equations.body, states)[1]
+    drive, dampers = equations.speed * ahead, _spring_energy_and_damping(equations.body, states)[1]
     return rates, np.column_stack([elastic, drive, dampers, damping, creep])
 
 
-def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
+def energies_at_states(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
     """Energies (n,) in J at states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
     w, body = equations.wheelset, equations.body
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     moved = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
     kinetic = 0.5 * (w.mass * moved + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
-    return kinetic, _suspension(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
+    return kinetic, _spring_energy_and_damping(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
 
 
-def _suspension(body: Body, states: Array) -> tuple[Array, Array]:
+def _spring_energy_and_damping(body: Body, states: Array) -> tuple[Array, Array]:
     """Energy stored in the springs (n,), and power dissipated in the dampers (n,)."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])

@@ -33,11 +33,11 @@ from models.machine.compiled import inlined, lean, njit
 from models.machine.records import size_of
 from models.rail.profile_contact import Pose
 from models.rail.wheel_forces import (
-    LAWS,
+    LAW_NUMBERS,
     REPORT,
     Rails,
-    patches,
-    plain,
+    count_of_patches,
+    plain_rails,
     rails_in,
     rails_of,
     room_for,
@@ -46,8 +46,8 @@ from models.rail.wheel_forces import (
 )
 from models.rail.wheelset import GRAVITY, Wheelset
 
-STATES = 10
-Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
+STATE_COUNT = 10
+Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATE_COUNT)
 ALLOWED_STEP_RATE, LIMIT_OF_RK4 = 2.5, 2.785
 """Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
 DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
@@ -56,9 +56,9 @@ FASTEST_SPEED = 200.0
 """m/s"""
 LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
-DEEPEST = 5e-3
+DEEPEST_POSITION = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
-UNREPORTED = np.empty(0, REPORT)
+NO_REPORT = np.empty(0, REPORT)
 """Contacts of which nobody asks; to make those that are asked for takes longer than the rates."""
 
 
@@ -86,10 +86,10 @@ class Body(NamedTuple):
 class Stages(NamedTuple):
     """Arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
-    total: Array
+    summed_rate: Array
     rate: Array
-    here: Array
-    none: Array
+    stage_state: Array
+    empty_report: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,7 +122,7 @@ def set_rates(state, speed, body, rails, out, report, room):
     force[1] += 2.0 * body.carried * body.lean
     force[2] += 2.0 * body.carried
     if body.held:
-        _hold(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
+        _add_suspension_forces(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
@@ -137,7 +137,7 @@ def set_rates(state, speed, body, rails, out, report, room):
 
 
 @lean
-def _hold(state, body, turning, axle, force, moment):
+def _add_suspension_forces(state, body, turning, axle, force, moment):
     """Add the forces of springs and dampers at both ends of the axle; turning : angular velocity about the x and y of
     the axle's own axes (rad/s)."""
     (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = turning, body.stiffness, body.damping
@@ -163,14 +163,14 @@ def march(state, parameters, steps, path, reports):
     parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
     reports.
     """
-    stages = Stages(np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(0, REPORT))
+    stages = Stages(np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(STATE_COUNT), np.empty(0, REPORT))
     speed, body, rails = parameters
     made = rails_in(rails)
-    return _march(state, (speed, Body(*body), made), steps, path, reports, room_for(made.profile), stages)
+    return _march_with_arrays(state, (speed, Body(*body), made), steps, path, reports, room_for(made.profile), stages)
 
 
 @lean
-def _march(state, parameters, steps, path, reports, room, stages):
+def _march_with_arrays(state, parameters, steps, path, reports, room, stages):
     """March the state over all steps with arrays allocated by the caller; holding no references to them saves 5 % of
     the time of a bare wheelset."""
     (speed, body, rails), (step, count, every), (total, rate, here, none) = parameters, steps, stages
@@ -180,17 +180,17 @@ def _march(state, parameters, steps, path, reports, room, stages):
             kept = stage == 0 and row * every == i
             report = reports[row] if kept else none
             ahead = step if stage == 3 else 0.5 * step
-            for k in range(STATES):  # a sum of whole arrays would make one
+            for k in range(STATE_COUNT):  # a sum of whole arrays would make one
                 here[k] = state[k] + ahead * rate[k] if stage > 0 else state[k]
             set_rates(here, speed, body, rails, rate, report, room)
-            for k in range(STATES):
+            for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if kept:
-                for k in range(STATES):
+                for k in range(STATE_COUNT):
                     path[row, k] = state[k]
             if stage == 0 and i == count:
                 return i
-        for k in range(STATES):
+        for k in range(STATE_COUNT):
             state[k] += step / 6.0 * total[k]
         if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < LIMIT:
             return i
@@ -223,8 +223,8 @@ class Equations:
     lean: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.law not in LAWS:
-            raise InputError("", "law", self.law, "is not known", tuple(LAWS))
+        if self.law not in LAW_NUMBERS:
+            raise InputError("", "law", self.law, "is not known", tuple(LAW_NUMBERS))
         number("speed", self.speed, "a speed in m/s from -200 to 200", -FASTEST_SPEED, FASTEST_SPEED)
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
@@ -236,7 +236,7 @@ class Equations:
         sunk = float(w.ellipse.approach) / w.slant[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
             rails = rails_of(w)
-            sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
+            sunk = float(brentq(lambda z: supported_force(z, rails) - w.load, 0.0, DEEPEST_POSITION, xtol=1e-15))
         stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
         held = any(stiffness + damping)
         inertia = w.mass, w.spin_inertia, w.yaw_inertia
@@ -253,14 +253,14 @@ class Equations:
 
         The last two as plain tuples: numba asks Python for the type of a NamedTuple, in three times a call's own time.
         """
-        return float(self.speed), tuple(self.body), plain(self.rails)
+        return float(self.speed), tuple(self.body), plain_rails(self.rails)
 
     @cached_property
     def patch_count(self) -> int:
         """Largest possible number of contacts of both wheels together."""
-        return int(patches(self.rails.profile))
+        return int(count_of_patches(self.rails.profile))
 
-    def blank(self, *shape: int) -> Array:
+    def empty_contacts(self, *shape: int) -> Array:
         """Records REPORT (*shape, patches) for contacts that are not yet known.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
@@ -269,14 +269,14 @@ class Equations:
 
     def rates(self, state: Array) -> Array:
         """Time derivative (10,) of a state (10,)."""
-        out = np.empty(STATES)
-        rates(np.asarray(state, float), *self.parameters, out, UNREPORTED)
+        out = np.empty(STATE_COUNT)
+        rates(np.asarray(state, float), *self.parameters, out, NO_REPORT)
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:
         """Time derivatives (n, 10) of states (n, 10) by the hand-written equations, and their contacts, REPORT (n,
         patches)."""
-        every, contacts = np.empty_like(states), self.blank(len(states))
+        every, contacts = np.empty_like(states), self.empty_contacts(len(states))
         for state, rate, contact in zip(states, every, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
         return every, contacts
@@ -284,11 +284,11 @@ class Equations:
     @cached_property
     def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
-        start = np.zeros(STATES)
+        start = np.zeros(STATE_COUNT)
         start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
         return self._state_in_balance(start, (Z, SPIN), (Z_RATE, SPIN))
 
-    def displaced(self, shift: float) -> Array:
+    def displaced_state(self, shift: float) -> Array:
         """State (10,) at a lateral displacement (m), at rest but for the spin, without yaw; height and roll are in
         equilibrium."""
         start, w = self.rest.copy(), self.wheelset
@@ -317,10 +317,10 @@ class Equations:
     @cached_property
     def state_matrix(self) -> Array:
         """State matrix A (9, 9), linearised about rest; the angle of spin is left out."""
-        return slopes(self.rates, self.rest)
+        return rate_jacobian(self.rates, self.rest)
 
     @cached_property
-    def _fastest(self) -> float:
+    def _fastest_rate(self) -> float:
         """Largest eigenvalue magnitude (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
@@ -340,7 +340,7 @@ class Equations:
     def _marched(self, state: Array, count: int, step: float, stride: int) -> tuple[Array, Array]:
         """States and contacts at every ``stride``-th step of a path; ``state`` (10,) is modified."""
         kept = count // stride + 1
-        states, contacts = np.empty((kept, STATES)), self.blank(kept)
+        states, contacts = np.empty((kept, STATE_COUNT)), self.empty_contacts(kept)
         done = march(state, self.parameters, (step, count, stride), states, contacts)
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
@@ -359,7 +359,7 @@ class Equations:
         """Raise RunFailed if the step was too large for a patch with more than its load at rest, since the whole path
         is then wrong."""
         for k in sorted(set(path.contacts["load"].argmax(axis=0))):
-            rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
+            rate = float(np.abs(np.linalg.eigvals(rate_jacobian(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
                 raise RunFailed(
                     self.ENGINE,
@@ -370,15 +370,15 @@ class Equations:
 
     def _steps(self, state: Array, duration: float, step: float, stride: int) -> int:
         """Number of steps of a run, after checks of state, duration, step and stride."""
-        if quantity("state", state, "ten finite numbers").shape != (STATES,):
-            raise InputError("", "state", None, f"must be {STATES} finite numbers")
-        if not 0.0 < number("step", step, "a step in s") * self._fastest <= ALLOWED_STEP_RATE:
+        if quantity("state", state, "ten finite numbers").shape != (STATE_COUNT,):
+            raise InputError("", "state", None, f"must be {STATE_COUNT} finite numbers")
+        if not 0.0 < number("step", step, "a step in s") * self._fastest_rate <= ALLOWED_STEP_RATE:
             raise InputError(
                 "",
                 "step",
                 step,
-                f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest:.3g} s: the "
-                f"fastest motion has a rate of {self._fastest:.4g} 1/s",
+                f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest_rate:.3g} s: the "
+                f"fastest motion has a rate of {self._fastest_rate:.4g} 1/s",
             )
         if not divides(step, number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {step:g} s, 1 or more")
@@ -388,11 +388,11 @@ class Equations:
         return count
 
 
-def slopes(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
+def rate_jacobian(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
     """Jacobian (9, 9) of the rates about a state without the angle of spin, by fourth-order central differences over
     ``wide`` times the usual distance."""
     columns, moved = [], wide * DIFFERENCE_STEPS
-    for k in range(STATES):
-        a, b, c, d = (rates(state + part * moved[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
+    for k in range(STATE_COUNT):
+        a, b, c, d = (rates(state + part * moved[k] * np.eye(STATE_COUNT)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
         columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * moved[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)

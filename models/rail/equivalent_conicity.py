@@ -36,7 +36,7 @@ SERIES_LIMIT = 1e-6
 """Argument below which arctan z / z is its series to rounding."""
 AMPLITUDE_TOLERANCE = 1e-9
 """Share of an amplitude within which two waves are the same, or an amplitude is that of the table's ends."""
-NODES = 720
+HARMONIC_PHASES = 720
 """Phases of the first harmonic."""
 
 
@@ -98,7 +98,11 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | 
     if 2.0 * amplitude > last - first:
         allowed = f"is half of peak to peak, and the table goes from {first:g} to {last:g}: it cannot hold the wave"
         raise InputError(table.source, "amplitude", amplitude, allowed)
-    waves = [wave for low in _turning_points(table, amplitude) if (wave := _wave(table, low, amplitude)) is not None]
+    waves = [
+        wave
+        for low in _turning_points(table, amplitude)
+        if (wave := _wave_from_turning_point(table, low, amplitude)) is not None
+    ]
     if not waves:
         return _without_wave(table, amplitude)
     if len(waves) > 1 and guess is None:
@@ -123,14 +127,14 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
             table.integral(low + share * (high - low) + width) - table.integral(low + share * (high - low))
             for share in (0.0, 0.5, 1.0)
         )
-        points += [float(low + share * (high - low)) for share in _roots(begin, middle, end)]
+        points += [float(low + share * (high - low)) for share in _parabola_roots(begin, middle, end)]
     if len(places) == 1:
         points = [float(places[0])]
     apart = [k for k in range(len(points)) if k == 0 or points[k] - points[k - 1] > AMPLITUDE_TOLERANCE * amplitude]
     return [points[k] for k in apart]
 
 
-def _roots(begin: float, middle_value: float, end: float) -> list[float]:
+def _parabola_roots(begin: float, middle_value: float, end: float) -> list[float]:
     """Roots between 0 and 1 of the parabola with the given values at 0, 1/2 and 1; empty if it is zero everywhere."""
     bend, slope = 2.0 * (begin - 2.0 * middle_value + end), 4.0 * middle_value - 3.0 * begin - end
     scale = max(abs(begin), abs(middle_value), abs(end))
@@ -146,7 +150,7 @@ def _roots(begin: float, middle_value: float, end: float) -> list[float]:
     return sorted(min(max(root, 0.0), 1.0) for root in roots if -1e-12 <= root <= 1.0 + 1e-12)
 
 
-def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
+def _wave_from_turning_point(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWave | None:
     """The wave whose left turning point is ``low``; None if the motion would stop before the other turning point."""
     y, dr = table.between(low, low + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
@@ -155,17 +159,19 @@ def _wave(table: RollingRadiusTable, low: float, amplitude: float) -> KlingelWav
     if y.size == 2:  # within one straight piece, which makes a sine
         slope = float(dr[1] - dr[0]) / (2.0 * amplitude)
         return KlingelWave(amplitude, low + amplitude, 2.0 * math.pi / math.sqrt(slope)) if slope > 0.0 else None
-    energy = _energy(dr, length)
+    energy = _swing_energy(dr, length)
     if not ((energy[1:-1] > 0.0).all() and (_lowest_energy(dr, length, energy) > 0.0).all()):
         return None
     speed = np.sqrt(2.0 * energy)
     speed[0] = speed[-1] = 0.0
     moving = length > 0.0
     way = length[moving] / (speed[1:] + speed[:-1])[moving]
-    return KlingelWave(amplitude, low + amplitude, 2.0 * float(_times(way, np.diff(dr)[moving] / length[moving]).sum()))
+    return KlingelWave(
+        amplitude, low + amplitude, 2.0 * float(_crossing_times(way, np.diff(dr)[moving] / length[moving]).sum())
+    )
 
 
-def _energy(dr: Array, length: Array) -> Array:
+def _swing_energy(dr: Array, length: Array) -> Array:
     """Energy v^2 / 2 (n,) at the rows of a swing. Each is summed from the nearer turning point, where it is small, to
     limit rounding."""
     work = length * (dr[1:] + dr[:-1]) / 2.0
@@ -180,7 +186,7 @@ def _lowest_energy(dr: Array, length: Array, energy: Array) -> Array:
     return energy[:-1][falls] - 0.5 * way * dr[:-1][falls]
 
 
-def _times(way: Array, slope: Array) -> Array:
+def _crossing_times(way: Array, slope: Array) -> Array:
     """Time (n,) to cross each piece of dr; ``way`` : ratio of the piece's length to the sum of the speeds at both ends;
     slope : of dr."""
     root = np.sqrt(np.abs(slope))
@@ -194,7 +200,7 @@ def _times(way: Array, slope: Array) -> Array:
 def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     """A wave of zero conicity if the wheels do not steer over the whole swing; else the error that explains why there
     is no wave."""
-    idle = _idle(table, amplitude)
+    idle = _idle_centre(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
     dr, (first, last) = table.differences, table.ends
@@ -208,7 +214,7 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     raise InputError(table.source, "amplitude", amplitude, why)
 
 
-def _idle(table: RollingRadiusTable, amplitude: float) -> float | None:
+def _idle_centre(table: RollingRadiusTable, amplitude: float) -> float | None:
     """Centre of an interval with zero difference that is as wide as the swing, the one nearest to y = 0; None if there
     is none."""
     y, zero = table.displacements, table.differences == 0.0
@@ -234,7 +240,7 @@ def harmonic_linearised_conicity(
         differences = np.concatenate([-differences[:0:-1], differences])
     most = min(displacements[-1] - centre, centre - displacements[0])
     quantity("amplitude", amplitude, f"an amplitude above 0 and up to {most:g}, the table's", 1e-12, most)
-    phase = 2.0 * math.pi * (np.arange(NODES) + 0.5) / NODES
+    phase = 2.0 * math.pi * (np.arange(HARMONIC_PHASES) + 0.5) / HARMONIC_PHASES
     values = np.interp(centre + amplitude * np.sin(phase), displacements, differences)
     return float((values * np.sin(phase)).mean() / amplitude)
 
@@ -263,7 +269,7 @@ def conicity_row(table: RollingRadiusTable, amplitude: float, *, guess: float | 
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.thinned(), amplitude, guess=wave.centre).conicity
+        coarse = klingel_wave(table.without_every_second_row(), amplitude, guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

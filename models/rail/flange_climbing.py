@@ -12,7 +12,7 @@ FLANGE_ANGLE = math.radians(70.0)
 """Of a usual flange: a cone's spring has none of its own."""
 
 
-def nadal(friction: float, angle: float = FLANGE_ANGLE) -> float:
+def nadal_limit(friction: float, angle: float = FLANGE_ANGLE) -> float:
     """Limit of the ratio Y / Q below which a flange at an angle (rad) does not climb, by Nadal's formula."""
     return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
 

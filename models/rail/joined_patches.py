@@ -20,11 +20,11 @@ from models.core.errors import InputError, RunFailed
 
 CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
 """Cells along x, and along y over the narrowest patch; along y at most."""
-MARGINS = (1.4, 2.0, 3.0)
+GRID_MARGINS = (1.4, 2.0, 3.0)
 """Sides of the grid divided by those of the areas that the simplified theory finds."""
 UNKNOWN_HEIGHT = 1e-3
 """Height (m) where a distance is not known."""
-PRECISION, ITERATIONS = 1e-6, 30
+SOLUTION_PRECISION, MOST_ITERATIONS = 1e-6, 30
 """Relative, of the vertical load and of the approach."""
 
 
@@ -60,15 +60,15 @@ def press_exactly(
     (m); coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of
     the grid.
     """
-    for margin in MARGINS[:-1]:
+    for margin in GRID_MARGINS[:-1]:
         try:
-            return _pressed(patches, approximate_patches, load, approach, material_pair, margin, coarser)
+            return _pressed_patches(patches, approximate_patches, load, approach, material_pair, margin, coarser)
         except InputError:  # the contact reaches the edge of the grid
             continue
-    return _pressed(patches, approximate_patches, load, approach, material_pair, MARGINS[-1], coarser)
+    return _pressed_patches(patches, approximate_patches, load, approach, material_pair, GRID_MARGINS[-1], coarser)
 
 
-def _pressed(
+def _pressed_patches(
     patches: Sequence[Patch],
     approximate_patches: Sequence[PatchPressure],
     load: float,
@@ -77,19 +77,21 @@ def _pressed(
     margin: float,
     coarser: float,
 ) -> tuple[list[Share], float]:
-    x, y = _grid(approximate_patches, margin, coarser)
+    x, y = _grid_around(approximate_patches, margin, coarser)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_height(patch, x, y) for patch in patches])
     leading = float(np.cos(max(approximate_patches, key=lambda part: part.load).patch.lean))
     cell, whole = (x[1] - x[0]) * (y[1] - y[0]), load / leading
     alike = bool((cosines == leading).all())  # the heights are then the same at any approach
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         lowered = heights + approach * (leading - cosines)[:, None, None]
         owner = np.argmin(lowered, axis=0)
         solved = solve_normal(lowered.min(axis=0), x[1] - x[0], y[1] - y[0], material_pair, load=whole)
         forces = np.array([solved.pressure[owner == k].sum() * cell for k in range(len(patches))])
         vertical, reached = float(forces @ cosines), solved.approach / leading
-        close = abs(vertical / load - 1.0) < PRECISION and (alike or abs(reached / approach - 1.0) < PRECISION)
+        close = abs(vertical / load - 1.0) < SOLUTION_PRECISION and (
+            alike or abs(reached / approach - 1.0) < SOLUTION_PRECISION
+        )
         whole, approach = whole * load / vertical, reached
         if close:
             pieces, _ = label(solved.contact, np.ones((3, 3)))
@@ -100,7 +102,7 @@ def _pressed(
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
 
-def _grid(approximate_patches: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
+def _grid_around(approximate_patches: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
     """Cell centres (m) of a grid around all patches, along x and along the contour."""
     x0, x1 = min(part.box[0] for part in approximate_patches), max(part.box[1] for part in approximate_patches)
     y0 = min(part.box[2] + part.patch.contour_position for part in approximate_patches)

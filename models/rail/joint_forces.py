@@ -15,15 +15,17 @@ from models.contact.inputs import Array
 from models.machine.compiled import inlined, njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond
-from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
-from models.rail.profile_contact import KNOT, NODE, PROFILE, LaidProfile, Pose
+from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATE_COUNT, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
+from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
 from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
 
 JOINTS = 5
-HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
+TABLE_HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
 """Head of the table: speed (m/s), creep law, FASTSIM's middle; counts of the wheel's nodes, of the rail's knots, of
-strips and of cells. Then WHEELS, PROFILE, nodes, knots, and FASTSIM's strips and cells."""
-IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (size_of(kind) for kind in (HEAD, WHEELS, PROFILE, NODE, KNOT))
+strips and of cells. Then WHEELS, PROFILE_COUNTS, nodes, knots, and FASTSIM's strips and cells."""
+IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (
+    size_of(kind) for kind in (TABLE_HEAD, WHEELS, PROFILE_COUNTS, WHEEL_NODE, RAIL_KNOT)
+)
 PER_STRIP, PER_CELL = 4, 5
 """Rows of the strips and of the cells, see ``fastsim_grid``."""
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
@@ -40,7 +42,7 @@ def table(speed: float, rails: Rails) -> Array:
 @inlined
 def rails_at(numbers):
     """``Rails`` as views of a table at a pointer to doubles."""
-    head = records(numbers, 1, HEAD)[0]
+    head = records(numbers, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
     wheels = beyond(numbers, IN_HEAD)
     profile = beyond(wheels, IN_WHEELS)
@@ -50,7 +52,11 @@ def rails_at(numbers):
     first_cell = beyond(first_strip, PER_STRIP * strips)
     return Rails(
         records(wheels, 1, WHEELS),
-        LaidProfile(records(profile, 1, PROFILE), records(first_node, nodes, NODE), records(first_knot, knots, KNOT)),
+        LaidProfile(
+            records(profile, 1, PROFILE_COUNTS),
+            records(first_node, nodes, WHEEL_NODE),
+            records(first_knot, knots, RAIL_KNOT),
+        ),
         array(first_strip, (PER_STRIP, strips)),
         array(first_cell, (PER_CELL, cells)),
         head.middle,
@@ -75,7 +81,7 @@ def from_joints(joints: Array) -> Array:
 
 def rates_of(joints: Array, accelerations: Array) -> Array:
     """Time derivative (10,) of the state, from positions and rates (10,) and accelerations (5,) of the joints."""
-    out = np.empty(STATES)
+    out = np.empty(STATE_COUNT)
     out[_POSITIONS], out[_RATES] = joints[JOINTS:], accelerations
     roll, yaw_rate, roll_rate = joints[3], joints[JOINTS + 2], joints[JOINTS + 3]
     out[SPIN] += accelerations[2] * math.sin(roll) + yaw_rate * roll_rate * math.cos(roll)
@@ -88,7 +94,7 @@ def joint_forces(numbers, t, q, v, f):
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
-    rails, speed = rails_at(numbers), records(numbers, 1, HEAD)[0].speed
+    rails, speed = rails_at(numbers), records(numbers, 1, TABLE_HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
     out = array(f, (JOINTS,))

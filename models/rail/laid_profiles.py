@@ -16,18 +16,18 @@ from models.contact.wheel_on_rail import Pose, Track, WheelAndRail, Wheelset, ra
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
-from models.rail.profile_contact import KNOT, NODE, PROFILE, LaidProfile
+from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
-SPACING, OF_KNOTS = 1e-4, 2.5e-4
+NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
-SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
+LATERAL_SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
 """Lateral displacements (m) at which first contact is looked for."""
 CONTACT_JUMP, DISPLACEMENT_STEP = 3e-3, 1e-6
 """Way (m) on the wheel that first contact must jump between displacements that are so close (m)."""
-RIDGE = 1e-5
+RIDGE_HEIGHT = 1e-5
 """Height (m) of the gap between both places of a jump from which on the patches are two."""
-BLEND = 1e-3
+BLEND_HALF_LENGTH = 1e-3
 """Half the length (m) over which one zone passes into the next."""
 
 
@@ -61,9 +61,9 @@ class Profiles(Strict):
 
     def side(self, radius: float) -> WheelAndRail:
         """The right wheel with a radius (m) on its rail; raises InputError for files that contain no profile."""
-        rail = _profile(self.rail, "rail", self.smoothing)
+        rail = _contact_profile(self.rail, "rail", self.smoothing)
         return WheelAndRail(
-            _profile(self.wheel, "wheel", self.smoothing),
+            _contact_profile(self.wheel, "wheel", self.smoothing),
             rail_in_track(rail, Track(self.gauge, self.gauge_depth, self.inclination)),
             Wheelset(radius, self.back_to_back, self.taping),
         )
@@ -76,7 +76,7 @@ class Profiles(Strict):
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
-def _profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
+def _contact_profile(name: str, kind: Kind, smoothing: float) -> ContactProfile:
     known = BUILT_IN[kind]
     if name in known:
         return known[name]()
@@ -92,25 +92,29 @@ def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
 
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
-    y = _evenly_spaced(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
+    y = _evenly_spaced(side.wheel.y[tip:], side.wheel.z[tip:], NODE_SPACING)
     curve = side.wheel.curve
-    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first_contact(side, shift)) is not None]
-    cuts = [cut for cut in (_ridge(side, *pair) for pair in pairwise(touched)) if cut is not None]
-    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, cuts)])
-    knots = _evenly_spaced(side.rail.y, side.rail.z, OF_KNOTS)
+    touched = [
+        (shift, touch[0]) for shift in LATERAL_SHIFTS.tolist() if (touch := _first_contact(side, shift)) is not None
+    ]
+    cuts = [cut for cut in (_ridge_position(side, *pair) for pair in pairwise(touched)) if cut is not None]
+    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones_of_positions(y, cuts)])
+    knots = _evenly_spaced(side.rail.y, side.rail.z, KNOT_SPACING)
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
-    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]]
-    return LaidProfile(*(_frozen(*pair) for pair in ((head, PROFILE), (nodes, NODE), (rail, KNOT))))
+    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, side.wheelset.arm, level]]
+    return LaidProfile(
+        *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))
+    )
 
 
 def no_profile() -> LaidProfile:
     """An empty profile, for a wheelset on cones: no zones, nodes or knots."""
-    return LaidProfile(np.zeros(1, PROFILE), np.empty(0, NODE), np.empty(0, KNOT))
+    return LaidProfile(np.zeros(1, PROFILE_COUNTS), np.empty(0, WHEEL_NODE), np.empty(0, RAIL_KNOT))
 
 
-def _frozen(rows: Any, kind: np.dtype) -> Array:
+def _read_only_records(rows: Any, kind: np.dtype) -> Array:
     """Read-only records (n,) from rows of numbers."""
     made = np.ascontiguousarray(rows, float).view(kind)[:, 0]
     made.flags.writeable = False
@@ -135,7 +139,9 @@ def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Arra
     return float(places[np.argmin(gap)]), places, gap
 
 
-def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]) -> float | None:
+def _ridge_position(
+    side: WheelAndRail, touch_before: tuple[float, float], touch_after: tuple[float, float]
+) -> float | None:
     """Position of the largest gap between the two contact positions of a jump. ``touch_before`` and ``touch_after`` are
     pairs (shift, position). None if contact does not jump between them."""
     while abs(touch_after[1] - touch_before[1]) > CONTACT_JUMP:
@@ -147,7 +153,7 @@ def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: t
         low, high = sorted((touch_before[1], touch_after[1]))
         if touch_after[0] - touch_before[0] < DISPLACEMENT_STEP:
             between = (places > low) & (places < high)
-            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
+            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE_HEIGHT else None
         if abs(here - touch_before[1]) > abs(here - touch_after[1]):
             touch_after = middle, here
         else:
@@ -155,10 +161,10 @@ def _ridge(side: WheelAndRail, touch_before: tuple[float, float], touch_after: t
     return None
 
 
-def _zones(y: Array, cuts: list[float]) -> Array:
+def _zones_of_positions(y: Array, cuts: list[float]) -> Array:
     """Zone (n,) of positions on the wheel: a whole number, or a fraction in the smooth transition between two zones."""
     zones = np.zeros(y.size)
     for cut in cuts:
-        t = np.clip((y - cut) / (2.0 * BLEND) + 0.5, 0.0, 1.0)
+        t = np.clip((y - cut) / (2.0 * BLEND_HALF_LENGTH) + 0.5, 0.0, 1.0)
         zones += t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
     return zones

@@ -26,40 +26,40 @@ import numpy as np
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
-from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, WheelsetPath, Y
+from models.rail.equations import ANGLE, STATE_COUNT, Y_RATE, Equations, WheelsetPath, Y
 from models.rail.linear import critical_speed
 from models.rail.wheelset import Wheelset
 
-Unknown = Literal["amplitude", "speed"]
-SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
+SoughtQuantity = Literal["amplitude", "speed"]
+STATE_SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
 """Of the states (m, rad, m/s, rad/s): what a difference of each is measured by."""
-CLOSED = 1e-9
-"""Largest difference of start and end, by SIZES, of a state that has come back."""
-SHIFT = 1e-2
+CLOSURE_TOLERANCE = 1e-9
+"""Largest difference of start and end, by STATE_SIZES, of a state that has come back."""
+DIFFERENCE_SHARE = 1e-2
 """Of the sizes, of 1 m/s and the period: steps of the central differences that linearise the return, wide enough to
 reach over the kinks that cells of FASTSIM make where they begin to slide."""
-NEWTON, LEAST_GAIN = 15, 0.3
+MOST_NEWTON_STEPS, LEAST_GAIN = 15, 0.3
 """Corrections at most; share of the difference that one may leave before the return is linearised anew."""
-ASIDE = 0.01
+DISPLACED_GUESS = 0.01
 """Share by which a guess for other equations is displaced, so that they find the orbit by themselves."""
-HALVINGS = 5
+AMPLITUDE_HALVINGS = 5
 """Of the way to the next amplitude, where Newton's method does not reach it at once."""
-RETURNS = [k for k in range(STATES) if k != ANGLE]
+RETURNING_STATES = [k for k in range(STATE_COUNT) if k != ANGLE]
 """States that must come back; the angle of spin does not."""
-SPEED, PERIOD = len(RETURNS), len(RETURNS) + 1
+SPEED_COLUMN, PERIOD_COLUMN = len(RETURNING_STATES), len(RETURNING_STATES) + 1
 """Columns of the slopes after those of the states."""
-AMPLITUDE, RATE = RETURNS.index(Y), RETURNS.index(Y_RATE)
-SECTION_COORDINATES = [k for k in range(len(RETURNS)) if k != RATE]
+AMPLITUDE_INDEX, RATE_INDEX = RETURNING_STATES.index(Y), RETURNING_STATES.index(Y_RATE)
+SECTION_COORDINATES = [k for k in range(len(RETURNING_STATES)) if k != RATE_INDEX]
 """Indices of the coordinates that span the Poincaré section."""
 DECAYED_DISPLACEMENT = 1e-5
 """Displacement (m) below which a motion has died out."""
-MARCH, MARCHES = 2.0, 20
+MARCH_DURATION, MOST_MARCHES = 2.0, 20
 """Seconds of one march towards the cycle, and how many there are at most."""
 AMPLITUDE_CHANGE = 2e-3
 """Relative change of the amplitude from cycle to cycle from which Newton's method takes over."""
 FIRST_AMPLITUDES = (0.1, 0.2, 0.4)
 """Amplitudes at which a branch may begin, by the clearance of the flanges: of the smallest that leads to an orbit."""
-INNER, OUTER = 12, 0.03
+INNER_AMPLITUDES, OUTER_STEP = 12, 0.03
 """Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
 LARGEST_AMPLITUDE = 2.0
 """Amplitude at which a branch ends, by the clearance."""
@@ -70,8 +70,8 @@ class Orbit:
     """One periodic motion. state (10,) : at a maximum of y; period : s, with the number of steps in it.
 
     slopes (9, 11) : derivatives of the state after a period (without the angle of spin) with respect to the state
-    before, the speed and the period, in units of SIZES, 1 m/s and the period. error : change of the unknown when the
-    step is halved, frequency_error : Hz; both NaN where the step was not halved.
+    before, the speed and the period, in units of STATE_SIZES, 1 m/s and the period. error : change of the unknown when
+    the step is halved, frequency_error : Hz; both NaN where the step was not halved.
     """
 
     equations: Equations
@@ -100,8 +100,8 @@ class Orbit:
     @property
     def multiplier(self) -> float:
         """Largest magnitude of the Floquet multipliers."""
-        by_states, back = self.slopes[:, : len(RETURNS)], self.slopes[:, PERIOD]
-        returned = by_states - np.outer(back, by_states[RATE]) / back[RATE]
+        by_states, back = self.slopes[:, : len(RETURNING_STATES)], self.slopes[:, PERIOD_COLUMN]
+        returned = by_states - np.outer(back, by_states[RATE_INDEX]) / back[RATE_INDEX]
         return float(np.abs(np.linalg.eigvals(returned[np.ix_(SECTION_COORDINATES, SECTION_COORDINATES)])).max())
 
     @property
@@ -121,10 +121,12 @@ def guess_near_state(
     most ``step`` (s)."""
     start = state.copy()
     start[Y_RATE] = 0.0
-    return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
+    return _with_slopes(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)), executor)
 
 
-def beginning(equations: Equations, amplitude: float, step: float, executor: Executor | None = None) -> Orbit:
+def orbit_of_small_amplitude(
+    equations: Equations, amplitude: float, step: float, executor: Executor | None = None
+) -> Orbit:
     """Orbit of a small amplitude (m), found from the linear motion that neither grows nor decays at the critical speed.
 
     step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
@@ -138,30 +140,30 @@ def beginning(equations: Equations, amplitude: float, step: float, executor: Exe
     values, vectors = np.linalg.eig(at.state_matrix)
     k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
     state = at.rest.copy()
-    state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
+    state[RETURNING_STATES] += amplitude * (vectors[:, k] / vectors[AMPLITUDE_INDEX, k]).real
     guess = guess_near_state(at, state, 2.0 * math.pi / values[k].imag, step, executor)
     return solved_orbit(guess, "speed", executor=executor)
 
 
 def guess_from_orbit(orbit: Orbit, equations: Equations) -> Orbit:
     """Initial guess for the orbit of changed equations: the known orbit, with its distance from rest enlarged by the
-    share ASIDE."""
+    share DISPLACED_GUESS."""
     rest = orbit.equations.rest
-    return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
+    return replace(orbit, equations=equations, state=rest + (1.0 + DISPLACED_GUESS) * (orbit.state - rest))
 
 
-def branch(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
+def branch_of_orbits(first: Orbit, amplitudes: Iterable[float], executor: Executor | None = None) -> Iterator[Orbit]:
     """Orbits of successive amplitudes (m), each continued from the ones before; the speed of each is solved for.
 
     Raises RunFailed where the branch cannot be followed.
     """
     before, last = replace(first, state=first.equations.rest), first
     for amplitude in amplitudes:
-        before, last = last, _onwards(before, last, amplitude, HALVINGS, executor)
+        before, last = last, _continued_orbit(before, last, amplitude, AMPLITUDE_HALVINGS, executor)
         yield last
 
 
-def _onwards(
+def _continued_orbit(
     earlier_orbit: Orbit, latest_orbit: Orbit, amplitude: float, halvings: int, executor: Executor | None
 ) -> Orbit:
     """Orbit of an amplitude, predicted on the straight line through two earlier orbits; the interval is halved if this
@@ -184,11 +186,15 @@ def _onwards(
     except RunFailed:
         if halvings == 0:
             raise
-    middle = _onwards(earlier_orbit, latest_orbit, (latest_orbit.amplitude + amplitude) / 2.0, halvings - 1, executor)
-    return _onwards(latest_orbit, middle, amplitude, halvings - 1, executor)
+    middle = _continued_orbit(
+        earlier_orbit, latest_orbit, (latest_orbit.amplitude + amplitude) / 2.0, halvings - 1, executor
+    )
+    return _continued_orbit(latest_orbit, middle, amplitude, halvings - 1, executor)
 
 
-def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, executor: Executor | None = None) -> Orbit:
+def solved_orbit(
+    guess: Orbit, unknown: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
+) -> Orbit:
     """Orbit near a guess. ``unknown`` is solved for: speed or amplitude, while the other keeps the guess's value. A
     precise one gets its own slopes.
 
@@ -196,22 +202,22 @@ def solved_orbit(guess: Orbit, unknown: Unknown, *, precise: bool = True, execut
     Raises RunFailed if none is found.
     """
     orbit, fresh, left = guess, False, math.inf
-    for _ in range(NEWTON):
+    for _ in range(MOST_NEWTON_STEPS):
         try:
             end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
-        missed = ((end - orbit.state) / SIZES)[RETURNS]
+        missed = ((end - orbit.state) / STATE_SIZES)[RETURNING_STATES]
         size = float(np.abs(missed).max())
-        if size < CLOSED:
-            return orbit if fresh or not precise else _linearised(orbit, executor)
+        if size < CLOSURE_TOLERANCE:
+            return orbit if fresh or not precise else _with_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
-            orbit, fresh = _linearised(orbit, executor), True
-        orbit, left, fresh = _corrected(orbit, missed, unknown), size, False
+            orbit, fresh = _with_slopes(orbit, executor), True
+        orbit, left, fresh = _newton_corrected(orbit, missed, unknown), size, False
     raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
 
 
-def refined(orbit: Orbit, unknown: Unknown, executor: Executor | None = None) -> Orbit:
+def refined_orbit(orbit: Orbit, unknown: SoughtQuantity, executor: Executor | None = None) -> Orbit:
     """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
     half = solved_orbit(replace(orbit, steps=2 * orbit.steps), unknown, precise=False, executor=executor)
     return replace(
@@ -229,42 +235,45 @@ Guess = tuple[Equations, Array, float]
 """Equations, state (10,) and period (s)."""
 
 
-def _linearised(orbit: Orbit, executor: Executor | None) -> Orbit:
+def _with_slopes(orbit: Orbit, executor: Executor | None) -> Orbit:
     """The orbit with slopes computed about itself."""
     eq, T, state, signs = orbit.equations, orbit.period, orbit.state, (-1.0, 1.0)
     pairs: list[list[Guess]] = [
-        *([(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T) for sign in signs] for k in RETURNS),
-        [(replace(eq, speed=eq.speed + sign * SHIFT), state, T) for sign in signs],
-        [(eq, state, T * (1.0 + sign * SHIFT)) for sign in signs],
+        *(
+            [(eq, state + sign * DIFFERENCE_SHARE * STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T) for sign in signs]
+            for k in RETURNING_STATES
+        ),
+        [(replace(eq, speed=eq.speed + sign * DIFFERENCE_SHARE), state, T) for sign in signs],
+        [(eq, state, T * (1.0 + sign * DIFFERENCE_SHARE)) for sign in signs],
     ]
-    ends = block_results(partial(_ends, steps=orbit.steps), pairs, executor)
-    columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
+    ends = block_results(partial(_ends_of_period, steps=orbit.steps), pairs, executor)
+    columns = [((after - before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES] for before, after in ends]
     return replace(orbit, slopes=np.array(columns).T)
 
 
-def _ends(pair: list[Guess], steps: int) -> list[Array]:
+def _ends_of_period(pair: list[Guess], steps: int) -> list[Array]:
     return [_state_after(*guess, steps) for guess in pair]
 
 
-def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
+def _newton_corrected(orbit: Orbit, missed: Array, unknown: SoughtQuantity) -> Orbit:
     """The orbit after one Newton correction with its slopes; the lateral rate stays zero."""
     returned = orbit.slopes.copy()
-    returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
-    free = [k for k in SECTION_COORDINATES if k != AMPLITUDE]
-    columns = [*free, AMPLITUDE if unknown == "amplitude" else SPEED, PERIOD]
+    returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
+    free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
+    columns = [*free, AMPLITUDE_INDEX if unknown == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
     *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
     state, speed = orbit.state.copy(), orbit.speed
-    places = [RETURNS[k] for k in free]
-    state[places] += section * SIZES[places]
+    places = [RETURNING_STATES[k] for k in free]
+    state[places] += section * STATE_SIZES[places]
     if unknown == "amplitude":
-        state[Y] += change * SIZES[Y]
+        state[Y] += change * STATE_SIZES[Y]
     else:
         speed += change
     period = orbit.period * (1.0 + longer)
     return replace(orbit, equations=replace(orbit.equations, speed=speed), state=state, period=period)
 
 
-def attained(
+def attained_cycle(
     equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
     """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None if the motion dies out.
@@ -272,21 +281,23 @@ def attained(
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
     """
-    state = equations.displaced(start)
-    for _ in range(MARCHES):
-        path = equations.run(state, MARCH, step)
+    state = equations.displaced_state(start)
+    for _ in range(MOST_MARCHES):
+        path = equations.run(state, MARCH_DURATION, step)
         y, state = path.states[:, Y], path.states[-1]
         if np.abs(y[-y.size // 4 :]).max() < DECAYED_DISPLACEMENT:
             return None
-        tops = maxima(y)
+        tops = positive_maxima(y)
         if tops.size > 2 and np.ptp(y[tops[-2:]]) < AMPLITUDE_CHANGE * y[tops[-1]]:
             period = float(path.times[tops[-1]] - path.times[tops[-2]])
             guess = guess_near_state(equations, path.states[tops[-1]], period, step, executor)
             return solved_orbit(guess, "amplitude", executor=executor)
-    raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
+    raise RunFailed(
+        "wheelset", f"no steady motion within {MOST_MARCHES * MARCH_DURATION:g} s at {equations.speed:.6g} m/s"
+    )
 
 
-def maxima(values: Array) -> np.ndarray:
+def positive_maxima(values: Array) -> np.ndarray:
     """Indices of the positive local maxima."""
     before, here, after = values[:-2], values[1:-1], values[2:]
     return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
@@ -303,17 +314,17 @@ def bifurcation(
     clearance = equations.wheelset.flange_clearance
     for share in FIRST_AMPLITUDES:
         try:
-            first = beginning(equations, share * clearance, step, executor)
+            first = orbit_of_small_amplitude(equations, share * clearance, step, executor)
             break
         except RunFailed:
             if share == FIRST_AMPLITUDES[-1]:
                 raise
-    inner = np.linspace(first.amplitude, clearance, INNER)[1:]
-    outer = (clearance * (1.0 + OUTER * k) for k in count(1))
-    yield refined(first, "speed", executor)
+    inner = np.linspace(first.amplitude, clearance, INNER_AMPLITUDES)[1:]
+    outer = (clearance * (1.0 + OUTER_STEP * k) for k in count(1))
+    yield refined_orbit(first, "speed", executor)
     for amplitudes in (inner, outer):
-        for orbit in branch(first, amplitudes, executor):
+        for orbit in branch_of_orbits(first, amplitudes, executor):
             if not slowest <= orbit.speed <= fastest or orbit.amplitude > LARGEST_AMPLITUDE * clearance:
                 return
             first = orbit
-            yield refined(orbit, "speed", executor)
+            yield refined_orbit(orbit, "speed", executor)

@@ -30,9 +30,9 @@ from models.rail.wheelset import Wheelset
 
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 200.0
 """Speeds (m/s) between which a critical one is looked for."""
-SPEEDS = 60
+SPEEDS_TRIED = 60
 """Speeds that are tried on the way from the lowest to the highest."""
-PRECISION = 1e-12
+SPEED_PRECISION = 1e-12
 """Relative, of a critical speed."""
 
 
@@ -67,13 +67,13 @@ class LinearWheelset:
         return np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), rates])
 
 
-def klingel(wheelset: Wheelset) -> float:
+def klingel_wavelength(wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset without slip; Klingel's formula but for the heads' radius (see above)."""
     r, b, head = wheelset.radius, wheelset.half_gauge, wheelset.head_radius
     return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.slant[0])))
 
 
-def kalker(wheelset: Wheelset) -> Array:
+def kalker_matrix(wheelset: Wheelset) -> Array:
     """Negative forces (3, 3) per creepage of one wheel: rows -fx, -fy, -mz, columns xi_x, xi_y, spin; N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.pair
     c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
@@ -81,24 +81,24 @@ def kalker(wheelset: Wheelset) -> Array:
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 
 
-def matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
+def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
     """``LinearWheelset`` at a speed (m/s), which must be above 0; raises InputError otherwise."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
-    w, creep = wheelset, kalker(wheelset)
+    w, creep = wheelset, kalker_matrix(wheelset)
     gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
     arm = w.half_spacing**2  # of the suspension; roll goes with the lateral displacement
     damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
     stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
     stiffness += gravity(w)
-    for motion, place in _contacts(w):
+    for motion, place in _contact_kinematics(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ place
     return LinearWheelset(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
-def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
+def _contact_kinematics(w: Wheelset) -> list[tuple[Array, Array]]:
     """Linear kinematics of the right and the left wheel: matrices (3, 2) from (y', psi') / V and from (y, psi) to the
     creepages and spin."""
     cosine, b = w.slant[1], w.half_gauge
@@ -121,36 +121,38 @@ def gravity(w: Wheelset) -> Array:
 
 def kinematic_wavelength(wheelset: Wheelset) -> float:
     """Wavelength (m) from the eigenvalues of a wheelset with creep forces only: no inertia, suspension or weight."""
-    creep = kalker(wheelset)
-    motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contacts(wheelset)) for k in (0, 1))
+    creep = kalker_matrix(wheelset)
+    motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contact_kinematics(wheelset)) for k in (0, 1))
     values = np.linalg.eigvals(-np.linalg.solve(motion, place))
     return float(2.0 * math.pi / np.abs(values.imag).max())
 
 
-def growth(wheelset: Wheelset, speed: float) -> float:
+def largest_growth(wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the eigenvalues at a speed (m/s)."""
-    return float(np.linalg.eigvals(matrices(wheelset, speed).state_matrix).real.max())
+    return float(np.linalg.eigvals(linear_matrices(wheelset, speed).state_matrix).real.max())
 
 
-def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth) -> float:
+def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = largest_growth) -> float:
     """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
 
     growth : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
     wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
-    speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS)
+    speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEEDS_TRIED)
     below = speeds[0]
     if growth(wheelset, below) >= 0.0:
         raise NoCriticalSpeed(unstable=True)
     for speed in speeds[1:]:
         if growth(wheelset, speed) >= 0.0:
-            return float(brentq(lambda v: growth(wheelset, v), below, speed, xtol=PRECISION * speed, rtol=PRECISION))
+            return float(
+                brentq(lambda v: growth(wheelset, v), below, speed, xtol=SPEED_PRECISION * speed, rtol=SPEED_PRECISION)
+            )
         below = speed
     raise NoCriticalSpeed(unstable=False)
 
 
 def critical_or_why(
-    wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth
+    wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = largest_growth
 ) -> tuple[float | None, str]:
     """The critical speed (m/s) and "", or None and the reason, as words that continue "the wheelset"."""
     try:

@@ -13,7 +13,7 @@ Where the depth is a parabola these are its depth and its width to the last digi
 are means, over a length between that of the overlap and that of Hertz' pressure: of the whole powers it is the one
 with which S1002 on UIC 60 bears where the exact contact does. All of them move smoothly with the wheelset, and a load
 goes over from one zone to the next without a jump. Patches of one wheel press the surface down under each other
-(``settled``).
+(``settle_depths``).
 
 The place lies ahead of the axle or behind it under yaw, and the depth grows, as the outline has it. Left out: that
 the axes of a patch turn about its normal under yaw, a conforming patch's curvature in its own plane, and that normal
@@ -31,13 +31,13 @@ from models.contact.inputs import Array
 from models.machine.compiled import lean, njit
 from models.machine.records import record
 
-PROFILE = record("zones", "nodes", "knots", "spacing", "arm", "level")
+PROFILE_COUNTS = record("zones", "nodes", "knots", "spacing", "arm", "level")
 """Counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes along the contour (m), distance
 of the taping line from the middle of the axle, height of the axle over the rail's top where both wheels just touch in
 the middle of the track."""
-NODE = record("y", "radius", "slope", "zone")
+WHEEL_NODE = record("y", "radius", "slope", "zone")
 """Of the wheel: place from the taping line (m), radius (m), slope and zone."""
-KNOT = record("y", "c0", "c1", "c2", "c3")
+RAIL_KNOT = record("y", "c0", "c1", "c2", "c3")
 """Of the rail: place from the middle of the track (m) and the coefficients of the cubic beyond it."""
 TOUCH = record("depth", "n_y", "n_z", "x", "y", "z", "along", "across")
 """A contact: penetration (m), normal into the rail, place from the wheelset's centre in the track's axes (m),
@@ -55,7 +55,7 @@ class Pose(NamedTuple):
 
 
 class LaidProfile(NamedTuple):
-    """Profiles of a wheel and its rail as records: PROFILE (1,), NODE (nodes,), KNOT (knots,)."""
+    """Profiles of a wheel and its rail as records: PROFILE_COUNTS (1,), WHEEL_NODE (nodes,), RAIL_KNOT (knots,)."""
 
     head: Array
     nodes: Array
@@ -64,13 +64,13 @@ class LaidProfile(NamedTuple):
 
 COARSE_NODES = 5
 """Nodes from one to the next that is always looked at."""
-MARGIN = 2e-5
+SEARCH_MARGIN = 2e-5
 """Depth (m) below the rail up to which the nodes between are looked at as well: two radii of 13 mm rise by 5e-6."""
 FAR_HEIGHT = 1e-3
 """Height (m) over the rail at which no slope of a rail leaves less than the margin."""
-SWEEPS = 6
+SHARE_SWEEPS = 6
 """Times that the patches' shares are found anew; each makes the error of the last some hundred times less."""
-SHARPEST = 500.0
+SHARPEST_CURVATURE = 500.0
 """Curvature (1/m) of a patch that only one node lies in."""
 _LEAST_DEPTH_SQUARE = 1e-40
 """m^2: sums of squares of depths far below an atom's are none."""
@@ -85,27 +85,29 @@ def profile_on_rail(side, pose, profile, modulus, touches):
     head = profile.head[0]
     sums = np.zeros(int(head.zones), _SUMS)
     y, z, roll, yaw = pose
-    seen = _seen(side * y, z + head.level, side * roll, side * yaw)  # the left wheel is the right one in a mirror
+    seen = _pose_of_wheel(
+        side * y, z + head.level, side * roll, side * yaw
+    )  # the left wheel is the right one in a mirror
     knot, before = 0, -1.0
     for j in range(0, int(head.nodes), COARSE_NODES):
-        node = _node(profile.nodes[j], seen, head, profile.knots, knot)
+        node = _node_contact(profile.nodes[j], seen, head, profile.knots, knot)
         knot = node[-1]
-        if max(before, node[0]) > -MARGIN:
+        if max(before, node[0]) > -SEARCH_MARGIN:
             for i in range(max(0, j - COARSE_NODES), j):
-                fine = _node(profile.nodes[i], seen, head, profile.knots, knot)
+                fine = _node_contact(profile.nodes[i], seen, head, profile.knots, knot)
                 if fine[0] > 0.0:
-                    _add(profile.nodes[i], fine, i * head.spacing, sums)
+                    _add_node(profile.nodes[i], fine, i * head.spacing, sums)
         before = node[0]
     together = 0
     for zone in range(len(sums)):
-        _patch(side, sums[zone], seen, touches[zone])
+        _fill_touch(side, sums[zone], seen, touches[zone])
         together += touches[zone].depth > 0.0
     if together > 1:
-        settled(touches, modulus)
+        settle_depths(touches, modulus)
 
 
 @lean
-def _seen(y, z, roll, yaw):
+def _pose_of_wheel(y, z, roll, yaw):
     """Position, cosines and sines of roll and yaw, and factors for the point of a wheel circle nearest to the rail."""
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     lead = sr * sy / cy
@@ -114,7 +116,7 @@ def _seen(y, z, roll, yaw):
 
 
 @lean
-def _node(node, seen, head, knots, knot):
+def _node_contact(node, seen, head, knots, knot):
     """Contact of one node's circle: depth along the rail's normal (m), position x, y, z from the centre, slope of the
     rail, and the index of the knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = seen
@@ -142,7 +144,7 @@ def _node(node, seen, head, knots, knot):
 
 
 @lean
-def _add(node, at, length, sums):
+def _add_node(node, at, length, sums):
     """Add a touching node, which represents a length (m) of the contour, to the sums of its zone, or of both zones in a
     transition."""
     depth, place_x, place_y, place_z, slope, _ = at
@@ -166,7 +168,7 @@ def _add(node, at, length, sums):
 
 
 @lean
-def _patch(side, sums, seen, touch):
+def _fill_touch(side, sums, seen, touch):
     """Fill one touch from the sums of its zone."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
     whole = sums.w2
@@ -179,11 +181,11 @@ def _patch(side, sums, seen, touch):
     touch.x, touch.y, touch.z = sums.x / whole, side * sums.y / whole, sums.z / whole
     _, _, cr, sr, cy = seen[:5]
     touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * whole / sums.radius
-    touch.across = depth / (spread + depth / SHARPEST)
+    touch.across = depth / (spread + depth / SHARPEST_CURVATURE)
 
 
 @njit(cache=True, error_model="numpy")
-def settled(touches, modulus):
+def settle_depths(touches, modulus):
     """Reduce the depths of one wheel's touches, TOUCH (zones,), by the elastic displacement that each touch's load
     causes at the others.
 
@@ -195,9 +197,9 @@ def settled(touches, modulus):
     for i in range(n):
         touch = touches[i]
         alone[i] = touch.depth
-        load[i], axis[i] = pressed(touch.depth, touch.along, touch.across, modulus)[:2]
+        load[i], axis[i] = normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[:2]
     stiff = load.copy()
-    for _ in range(SWEEPS):
+    for _ in range(SHARE_SWEEPS):
         for i in range(n):
             down = 0.0
             for j in range(n):
@@ -216,7 +218,7 @@ def _cosine_of_normals(first, second, squares):
 
 
 @lean
-def pressed(penetration, along, across, modulus):
+def normal_force_and_axes(penetration, along, across, modulus):
     """Elastic normal force (N) and semi-axes (m) from a penetration (m), curvatures along and across (1/m) and E* (Pa);
     zeros where there is a gap."""
     if penetration <= 0.0:

@@ -8,15 +8,15 @@ from scipy.optimize import root
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
 from models.rail.equivalent_conicity import harmonic_linearised_conicity
-from models.rail.profile_contact import TOUCH, Pose, pressed
-from models.rail.wheel_forces import contact_points, patches, rails_of
+from models.rail.profile_contact import TOUCH, Pose, normal_force_and_axes
+from models.rail.wheel_forces import contact_points, count_of_patches, rails_of
 from models.rail.wheelset import Wheelset
 
-SCALE = 1e-5
+CHANGE_SIZE = 1e-5
 """Size (m, rad) of the changes that contact yields."""
-PRECISION = 1e-9
+LOAD_PRECISION = 1e-9
 """Share of the load to which each wheel's is found."""
-SHIFTS = 16
+SHIFT_COUNT = 16
 """Lateral displacements up to the amplitude at which the rolling radii are found."""
 
 
@@ -51,11 +51,13 @@ def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
     def pose(unknown: Array) -> Equilibrium:
-        touches = np.zeros(patches(rails.profile), TOUCH)
-        here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
+        touches = np.zeros(count_of_patches(rails.profile), TOUCH)
+        here = (z + unknown[0] * CHANGE_SIZE, roll + unknown[1] * CHANGE_SIZE)
         contact_points(Pose(shift, *here, 0.0), rails, touches)
         modulus = rails.wheels["modulus"][0]
-        loads = np.array([pressed(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches])
+        loads = np.array(
+            [normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches]
+        )
         return Equilibrium(*here, touches, loads)
 
     def off(unknown: Array) -> Array:
@@ -63,7 +65,7 @@ def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
         return (now.loads * now.touches["n_z"]).reshape(2, -1).sum(axis=1) / half - 1.0
 
     solved = root(off, [5.0, 0.0], tol=1e-14)
-    if np.abs(solved.fun).max() > PRECISION:
+    if np.abs(solved.fun).max() > LOAD_PRECISION:
         raise RunFailed("wheelset", f"no height was found at which both wheels carry their load at y = {shift:g} m")
     return pose(solved.x)
 
@@ -71,6 +73,6 @@ def equilibrium(wheelset: Wheelset, shift: float) -> Equilibrium:
 def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     """The wheelset on cones with the equivalent conicity that its profiles have at an amplitude (m), for
     ``models.rail.linear``."""
-    shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
+    shifts = np.linspace(0.0, amplitude, SHIFT_COUNT + 1)
     differences = np.array([0.0, *(-np.diff(equilibrium(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
     return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

@@ -20,7 +20,7 @@ from models.contact.wheel_on_rail import Pose, WheelAndRail, lowest_point, touch
 from models.core.errors import InputError
 from models.core.tables import METRES, read_table
 
-COLUMNS = {"y": METRES, "dr": METRES}
+TABLE_COLUMNS = {"y": METRES, "dr": METRES}
 """Of a file: displacement to the right, rolling radius of the right wheel less that of the left one."""
 FEWEST_ROWS = 3
 """Rows of a table."""
@@ -103,7 +103,7 @@ class RollingRadiusTable:
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
-    def thinned(self) -> "RollingRadiusTable":
+    def without_every_second_row(self) -> "RollingRadiusTable":
         """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
         kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
         return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
@@ -114,7 +114,7 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, COLUMNS, least=FEWEST_ROWS)
+    table = read_table(path, TABLE_COLUMNS, least=FEWEST_ROWS)
     return RollingRadiusTable(table["y"], table["dr"], str(path))
 
 
@@ -134,7 +134,7 @@ def rolling_radii_of(
     for k, shift in enumerate(shifts.tolist()):
         report_progress(k / shifts.size)
         try:
-            rows.append((shift, *_radii(right, left, shift)))
+            rows.append((shift, *_rolling_radii(right, left, shift)))
         except InputError:
             if rows and shift > 0.0:
                 break
@@ -145,7 +145,7 @@ def rolling_radii_of(
     return RollingRadiusTable(y, of_right - of_left)
 
 
-def _radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
+def _rolling_radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
     pose = touching_pose(right, shift, 0.0, left)
     return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))

@@ -34,13 +34,13 @@ from models.machine.records import record
 from models.machine.stack import array, doubles
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.laid_profiles import laid_profile, no_profile
-from models.rail.profile_contact import TOUCH, LaidProfile, Pose, pressed, profile_on_rail
+from models.rail.profile_contact import TOUCH, LaidProfile, Pose, normal_force_and_axes, profile_on_rail
 from models.rail.wheelset import Wheelset
 
 REGULAR = 0.1
 """Speed (m/s) below which creepage is no longer relative to the speed of travel."""
 LINEAR, FASTSIM = 0, 1
-LAWS = {"linear": LINEAR, "fastsim": FASTSIM}
+LAW_NUMBERS = {"linear": LINEAR, "fastsim": FASTSIM}
 LEAST_CELLS, MOST_CELLS = 3, 200
 WHEELS = record(
     "radius", "half_gauge", "conicity", "head", "modulus", "shear", "nu", "friction", "damping", "clearance", "flange"
@@ -78,7 +78,7 @@ WHEELSET = np.dtype(
 )
 """Of the wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s); angular velocity,
 spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
-BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
+BLENDED_BRISTLES, SECOND_ORDER_MARCH = KINDS["blended"], MARCHES["second-order"]
 
 
 class Rails(NamedTuple):
@@ -153,23 +153,23 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
     net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
     laid = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
-    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAWS[law])
+    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[law])
 
 
-def plain(rails: Rails) -> tuple[Any, ...]:
+def plain_rails(rails: Rails) -> tuple[Any, ...]:
     """``Rails`` as plain tuples, which Python passes to compiled functions faster."""
     return tuple(tuple(part) if isinstance(part, LaidProfile) else part for part in rails)
 
 
 @inlined
 def rails_in(parts):
-    """``Rails`` made from the plain tuples of ``plain``."""
+    """``Rails`` made from the plain tuples of ``plain_rails``."""
     wheels, (head, nodes, knots), strips, cells, middle, law = parts
     return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
 
 
 @lean
-def patches(profile):
+def count_of_patches(profile):
     """Largest number of contacts of both wheels together: one per cone, or one per zone of the profiles."""
     return 2 if profile.nodes.size == 0 else 2 * int(profile.head[0].zones)
 
@@ -177,7 +177,7 @@ def patches(profile):
 @njit(cache=True, error_model="numpy")
 def room_for(profile):
     """``Workspace`` for the contacts of a wheelset on these profiles (or cones)."""
-    n = patches(profile)
+    n = count_of_patches(profile)
     return Workspace(
         np.empty(1, WHEELSET),
         np.empty(n, TOUCH),
@@ -201,23 +201,23 @@ def contact_points(pose, rails, touches):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
         touch = of_side[0]
         touch.depth, touch.n_y, touch.n_z, touch.x, touch.y, touch.z = depth, n_y, n_z, cx, cy, cz
-        touch.along, touch.across = _along(rolling, wheels.conicity), 0.5 / wheels.head
+        touch.along, touch.across = _longitudinal_curvature(rolling, wheels.conicity), 0.5 / wheels.head
 
 
 @njit(cache=True, error_model="numpy")
 def supported_force(z, rails):
     """Vertical part (N) of the elastic normal forces, with the wheelset's centre at height z (m) in the middle of the
     track."""
-    touches, whole = np.zeros(patches(rails.profile), TOUCH), 0.0
+    touches, whole = np.zeros(count_of_patches(rails.profile), TOUCH), 0.0
     contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)
     for k in range(len(touches)):
         touch = touches[k]
-        whole += touch.n_z * pressed(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
+        whole += touch.n_z * normal_force_and_axes(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
     return whole
 
 
 @inlined
-def _linear(a, b, motion, shear, poisson):
+def _linear_forces(a, b, motion, shear, poisson):
     """Creep forces and moment of one patch by Kalker's coefficients, for creepages and spin given as ``motion``."""
     x, y, spin = motion
     if a <= 0.0:
@@ -233,7 +233,7 @@ def _linear(a, b, motion, shear, poisson):
 
 
 @inlined
-def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
+def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
     """Fill fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll backwards (sign
     -1)."""
     by = max(abs(speed), REGULAR)
@@ -242,12 +242,19 @@ def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
         contact.xi_x, contact.xi_y = sign * slip[k].vx / by, slip[k].aside / by
         contact.spin = sign * slip[k].turn / by
     if rails.law == FASTSIM:
-        forces(contacts, strips_in(rails.strips), cells_in(rails.cells, rails.middle), BLEND, ORDER, wheel_forces)
+        forces(
+            contacts,
+            strips_in(rails.strips),
+            cells_in(rails.cells, rails.middle),
+            BLENDED_BRISTLES,
+            SECOND_ORDER_MARCH,
+            wheel_forces,
+        )
     else:
         shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
         for k in range(len(contacts)):
             c, force = contacts[k], wheel_forces[k]
-            force.fx, force.fy, force.mz = _linear(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
+            force.fx, force.fy, force.mz = _linear_forces(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
 
 
 @lean
@@ -260,7 +267,7 @@ def _both_ways(forwards, contacts, slip, speed, rails, room):
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
-            _one_way(sign, contacts, slip, speed, rails, directed)
+            _fill_one_direction(sign, contacts, slip, speed, rails, directed)
             for k in range(len(contacts)):
                 room.forces[k].fx += share * sign * directed[k].fx
                 room.forces[k].fy += share * directed[k].fy
@@ -268,7 +275,7 @@ def _both_ways(forwards, contacts, slip, speed, rails, room):
 
 
 @inlined
-def creep(contacts, slip, speed, rails, room):
+def fill_creep_forces(contacts, slip, speed, rails, room):
     """Fill the forces fx, fy, mz in ``room`` for contacts (CONTACT) from their sliding motion (MOTION).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
@@ -279,7 +286,7 @@ def creep(contacts, slip, speed, rails, room):
             c = contacts[k]
             c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
     if speed >= REGULAR:
-        _one_way(1.0, contacts, slip, speed, rails, room.forces[: len(contacts)])
+        _fill_one_direction(1.0, contacts, slip, speed, rails, room.forces[: len(contacts)])
     else:
         _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, room)
 
@@ -306,15 +313,17 @@ def _linear_cones(pose, wheels, wheelset, report):
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
         place = PatchPlace(n_y, n_z, cx, cy, cz)
-        motion = _moving(place, velocity, turning)
-        elastic, a, b = pressed(depth, _along(rolling, cone.conicity), 0.5 / cone.head, modulus)
+        motion = _patch_motion(place, velocity, turning)
+        elastic, a, b = normal_force_and_axes(
+            depth, _longitudinal_curvature(rolling, cone.conicity), 0.5 / cone.head, modulus
+        )
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
-        creeping = _linear(a, b, slip, shear, poisson)
+        creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = Pressed(depth, a, b, elastic, load, _flange(side, pose.y, wheels))
-        _act(place, press, creeping, wheelset.force, wheelset.moment)
+        press = Pressed(depth, a, b, elastic, load, _flange_force(side, pose.y, wheels))
+        _add_patch_forces(place, press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
-            _tell(place, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
+            _fill_report(place, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
 
 
 @lean
@@ -325,43 +334,43 @@ def patch_by_patch(pose, rails, report, room):
     contact_points(pose, rails, touches)
     for k in range(n):
         if touches[k].n_z != 0.0 or touches[k].n_y != 0.0:
-            push = _flange(RIGHT if 2 * k < n else LEFT, pose.y, wheels) if on_cones else 0.0
-            _press(touches[k], wheelset, wheels, push, room.contacts[count], room.motion[count])
+            push = _flange_force(RIGHT if 2 * k < n else LEFT, pose.y, wheels) if on_cones else 0.0
+            _fill_contact(touches[k], wheelset, wheels, push, room.contacts[count], room.motion[count])
             room.motion[count].patch, count = k, count + 1
-    creep(room.contacts[:count], room.motion[:count], velocity[0], rails, room)
+    fill_creep_forces(room.contacts[:count], room.motion[:count], velocity[0], rails, room)
     for k in range(len(report)):
-        _blank(report[k])
+        _blank_report(report[k])
     for i in range(count):
         contact, m, answer = room.contacts[i], room.motion[i], room.forces[i]
         touch = touches[int(m.patch)]
         press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
-        _act(_place(touch), press, creeping, wheelset.force, wheelset.moment)
+        _add_patch_forces(_patch_place(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
             motion = PatchMotion(m.vx, m.vy, m.aside, m.turn, m.rate)
-            _tell(_place(touch), motion, press, creeping, velocity[0], report[int(m.patch)])
+            _fill_report(_patch_place(touch), motion, press, creeping, velocity[0], report[int(m.patch)])
 
 
 @inlined
-def _along(rolling, conicity):
+def _longitudinal_curvature(rolling, conicity):
     """Curvature (1/m) of a cone along the track, from its rolling radius and conicity."""
     return 0.5 / (rolling * math.sqrt(1.0 + conicity * conicity))
 
 
 @inlined
-def _flange(side, y, wheels):
+def _flange_force(side, y, wheels):
     """Lateral force (N) of a cone's flange at a lateral position y."""
     return -side * wheels.flange * max(0.0, side * y - wheels.clearance)
 
 
 @inlined
-def _place(touch):
+def _patch_place(touch):
     """``PatchPlace`` of a touching point."""
     return PatchPlace(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
 
 
 @inlined
-def _moving(place, velocity, turning):
+def _patch_motion(place, velocity, turning):
     """``PatchMotion`` of a patch, from velocity and angular velocity of the wheelset."""
     n_y, n_z, cx, cy, cz = place
     vx = velocity[0] + turning[1] * cz - turning[2] * cy
@@ -371,10 +380,10 @@ def _moving(place, velocity, turning):
 
 
 @inlined
-def _press(touch, wheelset, wheels, push, contact, motion):
+def _fill_contact(touch, wheelset, wheels, push, contact, motion):
     """Kinematics and normal force of one patch: fill its contact for the creep law and its motion."""
-    moving = _moving(_place(touch), wheelset.velocity, wheelset.turning)
-    elastic, a, b = pressed(touch.depth, touch.along, touch.across, wheels.modulus)
+    moving = _patch_motion(_patch_place(touch), wheelset.velocity, wheelset.turning)
+    elastic, a, b = normal_force_and_axes(touch.depth, touch.along, touch.across, wheels.modulus)
     motion.vx, motion.vy, motion.aside, motion.turn, motion.rate = moving
     motion.elastic, motion.push = elastic, push
     contact.a, contact.b, contact.mu = a, b, wheels.friction
@@ -382,7 +391,7 @@ def _press(touch, wheelset, wheels, push, contact, motion):
 
 
 @inlined
-def _act(place, press, creeping, force, moment):
+def _add_patch_forces(place, press, creeping, force, moment):
     """Add the forces of one patch to the wheelset's force and moment."""
     n_y, n_z, cx, cy, cz = place
     fx, fy, mz = creeping
@@ -396,7 +405,7 @@ def _act(place, press, creeping, force, moment):
 
 
 @lean
-def _blank(report):
+def _blank_report(report):
     """Fill the report of a patch without contact with zeros."""
     report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
     report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
@@ -404,7 +413,7 @@ def _blank(report):
 
 
 @lean
-def _tell(place, motion, press, creeping, speed, report):
+def _fill_report(place, motion, press, creeping, speed, report):
     """Fill the report of one patch."""
     fx, fy, mz = creeping
     vx, vy, aside, turn, rate = motion

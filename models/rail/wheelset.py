@@ -102,7 +102,7 @@ class Wheelset(Strict):
         return by_load(cosine / (2.0 * self.radius), 1.0 / (2.0 * self.head_radius), load, self.pair)
 
 
-CHOSEN = Wheelset(
+CHOSEN_WHEELSET = Wheelset(
     mass=1200.0,
     spin_inertia=100.0,
     yaw_inertia=750.0,

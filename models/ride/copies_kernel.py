@@ -9,9 +9,9 @@ import numpy as np
 
 from models.machine.compiled import lean, njit
 
-POWERS = 4
+POWERS_SUMMED = 4
 """Of the outputs, from the first on, that are summed."""
-TOGETHER = 64
+COPIES_SIDE_BY_SIDE = 64
 """Copies that are stepped side by side, in vector registers: one after the other they take four times as long."""
 
 
@@ -99,7 +99,7 @@ def off_road(u, x, road, tyres, pressed, rate, lost):
 
 
 @lean
-def rates(x, road, laws, force, out, room):
+def fill_rates(x, road, laws, force, out, room):
     """Fill the time derivatives (2 n, copies) of states, positions, then rates, on roads (2 w, copies), and the
     nonlinear forces (s + u, copies) in N; room (2, copies) is overwritten."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
@@ -128,7 +128,7 @@ def rates(x, road, laws, force, out, room):
 
 
 @lean
-def output(p, x, road, rate, force, laws, out):
+def fill_output(p, x, road, rate, force, laws, out):
     """Fill one output (copies,) from the states and their time derivatives."""
     n, w = x.shape[0] // 2, road.shape[0]
     out[:] = 0.0
@@ -169,24 +169,24 @@ def march(states, roads, step, first, every, laws, sums):
     states (2 n, copies) are moved over roads (2 steps + 1, 2 w, copies), read every half step; sums (4, p, copies) gain
     the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.
     """
-    for copy in range(0, states.shape[1], TOGETHER):
-        columns = slice(copy, min(copy + TOGETHER, states.shape[1]))
+    for copy in range(0, states.shape[1], COPIES_SIDE_BY_SIDE):
+        columns = slice(copy, min(copy + COPIES_SIDE_BY_SIDE, states.shape[1]))
         x, road = states[:, columns].copy(), roads[:, :, columns].copy()
         k1, k2, k3, k4, moved = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
         forces = laws.rows.shape[0] + laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
-            rates(x, road[2 * i], laws, force, k1, room)
+            fill_rates(x, road[2 * i], laws, force, k1, room)
             if i >= first and (i - first) % every == 0:
                 for p in range(laws.read.shape[0]):
-                    output(p, x, road[2 * i], k1, force, laws, room[0])
+                    fill_output(p, x, road[2 * i], k1, force, laws, room[0])
                     sum_up(room[0], sums, p, copy)
             states_ahead(x, 0.5 * step, k1, moved)
-            rates(moved, road[2 * i + 1], laws, force, k2, room)
+            fill_rates(moved, road[2 * i + 1], laws, force, k2, room)
             states_ahead(x, 0.5 * step, k2, moved)
-            rates(moved, road[2 * i + 1], laws, force, k3, room)
+            fill_rates(moved, road[2 * i + 1], laws, force, k3, room)
             states_ahead(x, step, k3, moved)
-            rates(moved, road[2 * i + 2], laws, force, k4, room)
+            fill_rates(moved, road[2 * i + 2], laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):
                     x[j, c] += step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])

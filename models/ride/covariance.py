@@ -18,7 +18,7 @@ from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import ACCURACY, ZERO_MARGIN, Growth, MarginalParts, growth, split_marginal
+from models.ride.marginal import MATRIX_ACCURACY, ZERO_MARGIN, Growth, MarginalParts, split_marginal, variance_growth
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 """What an output can be."""
@@ -51,30 +51,30 @@ class StationaryCovariance:
         return np.sqrt(self.variance)
 
 
-def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryCovariance:
+def stationary_covariance(system: DelayedSystem, accuracy: float = MATRIX_ACCURACY) -> StationaryCovariance:
     """Stationary covariance of a system whose axles meet unit white noise one after the other.
 
     ``accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
-    where a variance cannot be told to UNCERTAIN of itself.
+    where a variance cannot be told to UNCERTAINTY_LIMIT of itself.
     """
-    met = hits(system)
+    met = noise_arrivals(system)
     split = split_marginal(system.A, accuracy)
     onto_stable = met._replace(B=[split.W @ b for b in met.B])  # in extended precision: modes may be nearly parallel
-    P, correction, residual = lyapunov(split.S, intensity(split.S, onto_stable))
+    P, correction, residual = lyapunov_solution(split.S, noise_intensity(split.S, onto_stable))
     V = split.V
-    if split.marginal:
+    if split.count_of_marginal_states:
         P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
     C = system.C @ V
-    floor, change = silence(C, P), _output_variances(C, correction)
+    floor, change = rounding_thresholds(C, P), _output_variances(C, correction)
     variance = _output_variances(C, P)
     variance = np.where(variance > floor, variance, 0.0)
-    grown = growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
-    status, reason = verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
+    grown = variance_growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
+    status, reason = variance_verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
     finite = np.array(status) == FINITE
     error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
-    error += split.neglected
-    if (error[finite] > UNCERTAIN).any():
+    error += split.neglected_rate_ratio
+    if (error[finite] > UNCERTAINTY_LIMIT).any():
         _refuse(system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
     return StationaryCovariance(
@@ -90,15 +90,15 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> StationaryC
     )
 
 
-def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
+def rounding_thresholds(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Thresholds (p,) of the variance of y = C x below which it is mere rounding, so that the output counts as
     silent."""
     terms = abs(C) @ np.sqrt(abs(np.diagonal(P)))
     most = abs(C).max(axis=1) * np.sqrt(abs(P).max(initial=0.0))
-    return np.asarray(np.maximum(CANCELLED * terms, SILENT * most) ** 2, float)
+    return np.asarray(np.maximum(CANCELLATION_SHARE * terms, SILENCE_SHARE * most) ** 2, float)
 
 
-class Hits(NamedTuple):
+class NoiseArrivals(NamedTuple):
     """Instants at which noise reaches the axles: B (n, k), D (p, k) and delays (s); ``independent`` : whether each axle
     has its own noise."""
 
@@ -108,23 +108,23 @@ class Hits(NamedTuple):
     independent: bool
 
 
-def hits(system: DelayedSystem) -> Hits:
-    """The ``Hits`` of a system; axles that meet the same noise at the same instant are combined."""
+def noise_arrivals(system: DelayedSystem) -> NoiseArrivals:
+    """The ``NoiseArrivals`` of a system; axles that meet the same noise at the same instant are combined."""
     if system.independent:
-        return Hits([*system.B], [*system.D], [0.0] * len(system.B), True)
+        return NoiseArrivals([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
     at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
     if len(delays) == len(system.B):
-        return Hits([system.B[i] for (i,) in at], [system.D[i] for (i,) in at], delays, False)
+        return NoiseArrivals([system.B[i] for (i,) in at], [system.D[i] for (i,) in at], delays, False)
     B, D = ([np.sum([each[i] for i in together], axis=0) for together in at] for each in (system.B, system.D))
-    return Hits(B, D, delays, False)
+    return NoiseArrivals(B, D, delays, False)
 
 
-Moved = Callable[[float, np.ndarray], np.ndarray]
+Propagator = Callable[[float, np.ndarray], np.ndarray]
 """e^(A t) B of a time (s) and B (n, k)."""
 
 
-def _responses(A: np.ndarray, met: Hits, moved: Moved | None = None) -> list[np.ndarray]:
+def _responses_before_arrival(A: np.ndarray, met: NoiseArrivals, moved: Propagator | None = None) -> list[np.ndarray]:
     """State responses F_j to earlier noise just before each hit; zero where no axle has met this noise before."""
     if moved is None:
 
@@ -139,23 +139,25 @@ def _responses(A: np.ndarray, met: Hits, moved: Moved | None = None) -> list[np.
     return before
 
 
-def noise_of(system: DelayedSystem, moved: Moved | None = None) -> np.ndarray:
-    """``intensity`` of the noise in a given system, in double precision."""
-    return intensity(system.A, hits(system), moved).astype(float)
+def noise_of(system: DelayedSystem, moved: Propagator | None = None) -> np.ndarray:
+    """``noise_intensity`` of the noise in a given system, in double precision."""
+    return noise_intensity(system.A, noise_arrivals(system), moved).astype(float)
 
 
-def intensity(A: np.ndarray, met: Hits, moved: Moved | None = None) -> np.ndarray:
+def noise_intensity(A: np.ndarray, met: NoiseArrivals, moved: Propagator | None = None) -> np.ndarray:
     """Matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise of all hits, with exact
     delays.
 
     ``moved`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
     noises cancel in an output, so do the squares of their rounding.
     """
-    before, at = ([each.astype(np.longdouble) for each in part] for part in (_responses(A, met, moved), met.B))
+    before, at = (
+        [each.astype(np.longdouble) for each in part] for part in (_responses_before_arrival(A, met, moved), met.B)
+    )
     return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, at, strict=True)))
 
 
-def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def lyapunov_solution(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Solution P of A P + P A' + Q = 0 in extended precision, the last correction, and the ratio of the residual to its
     largest term.
 
@@ -168,7 +170,7 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
 
     if A.shape != Q.shape or not (np.isfinite(A).all() and np.isfinite(Q).all()):
         raise InputError("", "A, Q", [list(A.shape), list(Q.shape)], "must be finite and of one shape (n, n)")
-    if not abs(Q - Q.T).max(initial=0.0) <= SKEW * abs(Q).max(initial=0.0):
+    if not abs(Q - Q.T).max(initial=0.0) <= ASYMMETRY_LIMIT * abs(Q).max(initial=0.0):
         raise InputError("", "Q", None, "must be symmetric")
     if len(A) == 0:
         return Q.astype(np.longdouble), Q.astype(np.longdouble), 0.0
@@ -176,20 +178,20 @@ def lyapunov(A: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, floa
         raise InputError("", "A", rate, "must be stable: the growth rate (1/s) of a motion that does not die out")
     wide, right = A.astype(np.longdouble), ((Q + Q.T) / 2).astype(np.longdouble)
     P = np.zeros_like(right)
-    for _ in range(1 + REFINEMENTS):
+    for _ in range(1 + MOST_REFINEMENTS):
         half = wide @ P
         correction = lyap(A, (half + half.T + right).astype(float), method="scipy").astype(np.longdouble)
         P = P + (correction + correction.T) / 2  # rounding leaves it askew, and half + half.T takes it to be symmetric
-        if abs(correction).max() <= REFINED * abs(P).max():
+        if abs(correction).max() <= REFINED_SHARE * abs(P).max():
             break
     half = wide @ P
     left = abs(half + half.T + right).max(initial=0.0)
     return P, correction, float(left / max(abs(half).max(initial=0.0), np.finfo(float).tiny))
 
 
-SKEW = 1e-9
+ASYMMETRY_LIMIT = 1e-9
 """Of a right side by its largest element: rounding."""
-UNCERTAIN = 1e-6
+UNCERTAINTY_LIMIT = 1e-6
 """Relative error of a variance beyond which none is given."""
 
 
@@ -204,13 +206,13 @@ def _refuse(name: str, error: float) -> None:
     )
 
 
-REFINEMENTS, REFINED = 6, 1e-11
+MOST_REFINEMENTS, REFINED_SHARE = 6, 1e-11
 """Corrections of the first solution at most, and the size of the last divided by that of P: what is left is its square.
 One is enough but where a motion hardly dies out; each takes as many digits off the error as the first solution had."""
 
 
 def _with_marginal(
-    split: MarginalParts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
+    split: MarginalParts, met: NoiseArrivals, onto_stable: NoiseArrivals, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance of the whole state (marginal motions first), its last correction and basis; motions with unbounded
     variance are left out.
@@ -218,15 +220,15 @@ def _with_marginal(
     A motion that does not diffuse responds only between the first and the last hit: its covariances are integrals over
     that window.
     """
-    k, onto_marginal = split.marginal, met._replace(B=[split.W0 @ b for b in met.B])
-    before = _responses(split.M, onto_marginal), _responses(split.S, onto_stable)
+    k, onto_marginal = split.count_of_marginal_states, met._replace(B=[split.W0 @ b for b in met.B])
+    before = _responses_before_arrival(split.M, onto_marginal), _responses_before_arrival(split.S, onto_stable)
     after = [
         [f + g for f, g in zip(*pair, strict=True)]
         for pair in zip(before, (onto_marginal.B, onto_stable.B), strict=True)
     ]
     within, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
     for j in range(0 if met.independent else len(met.B) - 1):
-        within += _window(split.M, after[0][j], met.delays[j + 1] - met.delays[j])
+        within += _integral_over_delay(split.M, after[0][j], met.delays[j + 1] - met.delays[j])
         cross += after[0][j] @ after[1][j].T - before[0][j + 1] @ before[1][j + 1].T
     if len(split.S):
         from control import lyap
@@ -238,7 +240,7 @@ def _with_marginal(
     return whole, changed, np.hstack([split.V0, split.V])
 
 
-def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
+def _integral_over_delay(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
     """Integral of e^(M s) R R' e^(M' s) from 0 to ``length`` by van Loan's block; M neither grows nor decays."""
     k = len(M)
     block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * length)
@@ -251,12 +253,12 @@ def _output_variances(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     return np.einsum("pi,ij,pj->p", C.astype(np.longdouble), P, C.astype(np.longdouble)).astype(float)
 
 
-CANCELLED, SILENT = 1e-9, 1e-12
+CANCELLATION_SHARE, SILENCE_SHARE = 1e-9, 1e-12
 """Deviations this much smaller than their terms together, or than the largest state could make them, are zero by
 symmetry, and all of them rounding: motions are told to about ten digits, and states at rest to those of P."""
 
 
-def verdicts(
+def variance_verdicts(
     D: Sequence[np.ndarray],
     variance: np.ndarray,
     floor: np.ndarray,
@@ -272,13 +274,13 @@ def verdicts(
     """
     direct = sum((d**2).sum(axis=1) for d in D) * fastest
     white = direct > (ZERO_MARGIN * accuracy) ** 2 * variance + floor
-    each = [_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
+    each = [_variance_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
     return tuple(status for status, _ in each), tuple(reason for _, reason in each)
 
 
-def _verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
+def _variance_verdict(white: bool, rate: float, power: int, split: MarginalParts | None) -> tuple[str, str]:
     if white:
-        return INFINITE, WHITE
+        return INFINITE, WHITE_NOISE_REASON
     if power:
         after = np.sqrt(rate * 100.0**power)
         return DIFFUSING, (
@@ -286,15 +288,15 @@ def _verdict(white: bool, rate: float, power: int, split: MarginalParts | None) 
             f"grows as {rate:.4g} t^{power} (t in s), a standard deviation of {after:.3g} after "
             "100 s"
         )
-    if split is None or not split.marginal:
+    if split is None or not split.count_of_marginal_states:
         return FINITE, "every motion dies out"
     return FINITE, (
-        f"{split.marginal} states are of motions that nothing pulls back, but this output does not see "
+        f"{split.count_of_marginal_states} states are of motions that nothing pulls back, but this output does not see "
         "them, or sees only what the road does not drive in the long run"
     )
 
 
-WHITE = (
+WHITE_NOISE_REASON = (
     "white noise of the road reaches this output directly, at all frequencies alike (tyre damping under a road "
     "filter of first order does that): take a road filter of second order, or a limited band"
 )

@@ -36,7 +36,7 @@ class DelayedSystem:
     independent: bool = False
 
 
-def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
+def vehicle_with_road(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
     """The vehicle with its road filters, at a constant speed (m/s, above 0).
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
@@ -45,7 +45,7 @@ def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> Del
     """
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
-    if singular(vehicle.mass):
+    if has_singular_mass(vehicle.mass):
         return first_order(vehicle, vehicle_states(vehicle), excitation, speed)[0]
     n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
     by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
@@ -89,7 +89,7 @@ NEGLIGIBLE_SHARE = 1e-10
 """Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which there is none."""
 
 
-def singular(mass: np.ndarray) -> bool:
+def has_singular_mass(mass: np.ndarray) -> bool:
     """Whether the mass matrix is singular: some motion involves no inertia."""
     return bool(_range_and_kernel(mass)[1].size)
 
@@ -99,15 +99,15 @@ class VehicleStates:
     """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
-    inert, slow: a and b by q.
+    massless_part, integrated_part: a and b by q.
     """
 
     A: np.ndarray
     B: np.ndarray
     Q: np.ndarray
     direct: np.ndarray
-    inert: np.ndarray
-    slow: np.ndarray
+    massless_part: np.ndarray
+    integrated_part: np.ndarray
 
 
 def vehicle_states(vehicle: LinearVehicle) -> VehicleStates:
@@ -156,10 +156,12 @@ def first_order(
     v = q @ A
     C = read.displacement_factors @ q + read.rate_factors @ v + read.acceleration_factors @ v @ A
     C[:, x:] += read.road_factors @ heights + read.road_rate_factors @ rate
-    return _system(vehicle, excitation, speed, A, B, C, _direct(read, q, v, B, noise)), q
+    return _system(vehicle, excitation, speed, A, B, C, _direct_transmission(read, q, v, B, noise)), q
 
 
-def _direct(read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray) -> np.ndarray:
+def _direct_transmission(
+    read: OutputRows, q: np.ndarray, v: np.ndarray, B: np.ndarray, noise: np.ndarray
+) -> np.ndarray:
     """Direct transmission D (axles, p, k) of white noise to the outputs, through q and q' of the state, B, and noise in
     the rates of the road's heights."""
     seen = read.rate_factors @ q @ B + read.acceleration_factors @ v @ B + read.road_rate_factors @ noise

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import control
 
 
-def matrices(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
+def exported_arrays(system: DelayedSystem, covariance: StationaryCovariance) -> dict[str, Any]:
     """Arrays for export by name: A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and
     standard deviations."""
     named: dict[str, Any] = {"A": system.A, "C": system.C}
@@ -32,7 +32,7 @@ def save(system: DelayedSystem, covariance: StationaryCovariance, stem: Path) ->
     """Write ``stem``.npz and ``stem``.mat; returns their paths."""
     from scipy.io import savemat
 
-    content = matrices(system, covariance)
+    content = exported_arrays(system, covariance)
     paths = [stem.with_suffix(".npz"), stem.with_suffix(".mat")]
     with whole_file(paths[0]) as part:
         np.savez(part, allow_pickle=False, **content)

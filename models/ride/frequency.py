@@ -28,18 +28,18 @@ from models.ride.marginal import Unstable
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 
-POINTS = 16
+GAUSS_POINTS = 16
 """Gauss points of a panel."""
 LOWEST_RATIO, HIGHEST_RATIO = 0.02, 1e12
 """Ends of the first and of the last panel, by the lowest and the highest frequency of vehicle and road. Not lower: near
 zero the stiffness of a free vehicle is all rounding, so that the first panel is not halved for ever either."""
-TOLERANCE = 1e-11
-"""A panel is halved while that changes any variance by more than this share; PANELS at most in all."""
-PANELS = 1500
+PANEL_TOLERANCE = 1e-11
+"""A panel is halved while that changes any variance by more than this share; MOST_PANELS at most in all."""
+MOST_PANELS = 1500
 EPS = float(np.finfo(float).eps)
-GROWING = 1e-6
+GROWTH_SHARE = 1e-6
 """Share of the fastest rate: a Jordan pair of zeros comes out at the root of rounding."""
-SILENT = 1e-24
+SILENCE_SHARE = 1e-24
 """Share of its terms' squares below which an output is zero by symmetry, and rounding is all of it."""
 
 Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
@@ -56,7 +56,7 @@ class Quadrature:
     frequencies: int
 
 
-def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
+def transfer_functions(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     """Transfer functions (n, p, w) from heights under the wheels to outputs at angular frequencies (n,) in rad/s, from
     the dynamic stiffness."""
     s = 1j * np.asarray(omega, float)[:, None, None]
@@ -76,12 +76,12 @@ def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
     return np.array([heights @ filtered for heights in excitation.heights])
 
 
-def spectra(
+def spectral_densities(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights | None = None
 ) -> np.ndarray:
     """Two-sided spectral densities (n, p) of the outputs over the angular frequency (rad/s); their integral over
     positive and negative frequencies is the variance."""
-    parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+    parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
     delays = np.array(excitation.lengths) / speed
@@ -91,19 +91,19 @@ def spectra(
 
 def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
     """One-sided spectral densities (n, p) of the outputs over the frequency (Hz)."""
-    return 4 * np.pi * spectra(vehicle, excitation, speed, 2 * np.pi * frequency)
+    return 4 * np.pi * spectral_densities(vehicle, excitation, speed, 2 * np.pi * frequency)
 
 
-def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
+def _weighted_transfer(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
     """Transfer functions (n, p, w) from heights to outputs, in which weighted outputs replace the unweighted ones."""
-    whole = transfer(vehicle, omega)
+    whole = transfer_functions(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
             whole[:, i] *= weights[output.name](omega / (2 * np.pi))[:, None]
     return whole
 
 
-def quadrature(
+def variances_by_quadrature(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weights: Weights | None = None
 ) -> Quadrature:
     """Variances of the outputs as integrals over all frequencies; inf where an integral diverges.
@@ -119,12 +119,12 @@ def quadrature(
     def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
         """Contributions (panels, p) to the variances from the frequency interval in each row of ``edges``."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
-        omega = (centre[:, None] + half[:, None] * NODES).ravel()
-        parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
-        parts = parts.reshape(len(parts), len(centre), POINTS, *parts.shape[2:])
-        return _integrals(parts, centre, half, excitation, speed)
+        omega = (centre[:, None] + half[:, None] * LEGENDRE_NODES).ravel()
+        parts = _weighted_transfer(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
+        parts = parts.reshape(len(parts), len(centre), GAUSS_POINTS, *parts.shape[2:])
+        return _panel_integrals(parts, centre, half, excitation, speed)
 
-    frequencies = _breaks(vehicle, excitation, speed)
+    frequencies = _panel_edges(vehicle, excitation, speed)
     edges = np.column_stack([frequencies[:-1], frequencies[1:]])
     first = over(edges)
     stiffness = vehicle.stiffness
@@ -132,22 +132,24 @@ def quadrature(
     digit = EPS * np.outer(largest, largest) * np.cos(np.arange(stiffness.size)).reshape(stiffness.shape)
     nudged = over(edges, replace(vehicle, stiffness=stiffness + digit))
     rounding = 10 * abs((nudged - first).sum(axis=0))  # one draw of many
-    seen = abs(_weighted(vehicle, frequencies[1:], weights or {})) @ abs(road(excitation, speed, frequencies[1:]))
+    seen = abs(_weighted_transfer(vehicle, frequencies[1:], weights or {})) @ abs(
+        road(excitation, speed, frequencies[1:])
+    )
     terms = np.einsum("ambk,ambk,m->b", seen, seen, frequencies[1:])
     total = abs(first).sum(axis=0)
-    limit = np.maximum(TOLERANCE * np.maximum(total, SILENT * terms), rounding)
+    limit = np.maximum(PANEL_TOLERANCE * np.maximum(total, SILENCE_SHARE * terms), rounding)
     variance, error, taken = _halve_panels(over, edges, first, limit)
     error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
-    return Quadrature(np.where(diverges, np.inf, variance), known, taken * POINTS)
+    return Quadrature(np.where(diverges, np.inf, variance), known, taken * GAUSS_POINTS)
 
 
 def _check_stable(vehicle: LinearVehicle) -> None:
     """Raise Unstable if a motion grows faster than rounding alone can make a free motion grow."""
     rates = poles(vehicle)
     worst = rates[rates.real.argmax()]
-    if worst.real > GROWING * abs(rates).max():
+    if worst.real > GROWTH_SHARE * abs(rates).max():
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
@@ -164,35 +166,37 @@ def _halve_panels(
         taken += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
         change = abs(halves - panels)
-        rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (taken < PANELS)
+        rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (taken < MOST_PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
         edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]
     return variance, error, taken
 
 
-NODES, GAUSS = leggauss(POINTS)
-DEGREES = np.arange(POINTS)
-TO_LEGENDRE = (DEGREES[:, None] + 0.5) * eval_legendre(DEGREES[:, None], NODES) * GAUSS
+LEGENDRE_NODES, LEGENDRE_WEIGHTS = leggauss(GAUSS_POINTS)
+LEGENDRE_DEGREES = np.arange(GAUSS_POINTS)
+TO_LEGENDRE = (
+    (LEGENDRE_DEGREES[:, None] + 0.5) * eval_legendre(LEGENDRE_DEGREES[:, None], LEGENDRE_NODES) * LEGENDRE_WEIGHTS
+)
 """Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
 
 
-def _integrals(
+def _panel_integrals(
     parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
 ) -> np.ndarray:
     """Contributions (panels, p) to the variances, for outputs that are sums of delayed parts (a, panels, nodes, p, k);
     both signs of the frequency are included."""
-    integrals = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
+    integrals = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), LEGENDRE_WEIGHTS).real
     for j in range(1, len(parts)) if not excitation.independent else ():
         for i in range(j):
             gap = (excitation.lengths[j] - excitation.lengths[i]) / speed
-            moments = 2 * 1j**DEGREES * spherical_jn(DEGREES, (half * gap)[:, None])
+            moments = 2 * 1j**LEGENDRE_DEGREES * spherical_jn(LEGENDRE_DEGREES, (half * gap)[:, None])
             weight = np.exp(1j * centre * gap)[:, None] * (moments @ TO_LEGENDRE)
             integrals += 2 * np.einsum("mbpk,mbpk,mb->mp", parts[i], parts[j].conj(), weight).real
     return integrals * half[:, None] / np.pi
 
 
-def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.ndarray:
+def _panel_edges(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.ndarray:
     """Edges (rad/s) of the first panels: frequencies that double from nearly 0 to far above all motions, and the
     undamped natural frequencies."""
     squares = abs(np.linalg.eigvals(np.linalg.solve(vehicle.mass, vehicle.stiffness)))
@@ -212,7 +216,7 @@ PER_PANEL = 10
 
 def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, wavenumber: np.ndarray) -> np.ndarray:
     """Two-sided densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in m/s."""
-    H = transfer(vehicle, speed * wavenumber)
+    H = transfer_functions(vehicle, speed * wavenumber)
     return np.einsum("kpi,kij,kpj->kp", H.conj(), heights(wavenumber), H, optimize=True).real
 
 
@@ -239,11 +243,11 @@ def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndar
     return ((start + half)[:, None] + half[:, None] * nodes).ravel(), (2.0 * half[:, None] * weights).ravel()
 
 
-HIGHEST = 60.0
+HIGHEST_FREQUENCY = 60.0
 """Hz up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
 PER_LOBE = 8
 """Frequencies for each lobe, 1 / T, of the first integral."""
-TOGETHER = 2000
+FREQUENCIES_AT_ONCE = 2000
 """Frequencies whose densities are made at once."""
 
 
@@ -252,9 +256,9 @@ def standard_errors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard errors (p,) of an output's mean, and of its mean square, over a time of ``duration`` (s)."""
     step = 2.0 * np.pi / duration / PER_LOBE
-    omega = step * (np.arange(int(2.0 * np.pi * HIGHEST / step)) + 0.5)
-    parts = np.array_split(omega, -(-len(omega) // TOGETHER))
-    density = np.concatenate([spectra(vehicle, excitation, speed, part) for part in parts])
+    omega = step * (np.arange(int(2.0 * np.pi * HIGHEST_FREQUENCY / step)) + 0.5)
+    parts = np.array_split(omega, -(-len(omega) // FREQUENCIES_AT_ONCE))
+    density = np.concatenate([spectral_densities(vehicle, excitation, speed, part) for part in parts])
     mean = 2.0 * step * np.sinc(omega * duration / (2.0 * np.pi)) ** 2 @ density
     square = 8.0 * np.pi / duration * step * (density**2).sum(axis=0)
     return np.sqrt(mean), np.sqrt(square)

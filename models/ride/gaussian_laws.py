@@ -13,9 +13,9 @@ from scipy.special import ndtr
 
 from models.vehicles.spatial import Curve, SpringDamper
 
-NODES = np.linspace(-1.0, 1.0, 801)
+TRAPEZOID_NODES = np.linspace(-1.0, 1.0, 801)
 """Of the trapezoidal rule, which converges geometrically for smooth integrands that vanish at both ends."""
-WIDE, TALL = 20.0, 9.0
+SECH_LIMIT, NORMAL_LIMIT = 20.0, 9.0
 """Where it ends: sech^2 is 4 e^-40 there, the normal density e^-40."""
 
 
@@ -25,7 +25,7 @@ def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float,
     if curve is None:
         return 0.0, 0.0
     if deviation == 0.0:
-        return curve(mean), curve.slope_at_rest() if mean == 0.0 else _slope(curve, mean)
+        return curve(mean), curve.slope_at_rest() if mean == 0.0 else _slope_of_curve(curve, mean)
     offset, slope, corners, bends = curve.hinges()
     bent, above = np.array(bends), (mean - np.array(corners)) / deviation
     density = np.exp(-(above**2) / 2.0) / np.sqrt(2.0 * np.pi)
@@ -33,7 +33,7 @@ def of_curve(curve: Curve | None, mean: float, deviation: float) -> tuple[float,
     return offset + slope * mean + float(bent @ beyond), slope + float(bent @ ndtr(above))
 
 
-def _slope(curve: Curve, x: float) -> float:
+def _slope_of_curve(curve: Curve, x: float) -> float:
     """Slope of a curve at x; at a corner, the slope on the side away from rest."""
     _, slope, corners, bends = curve.hinges()
     return slope + sum(bend for corner, bend in zip(corners, bends, strict=True) if x >= corner)
@@ -48,7 +48,7 @@ def of_friction(friction: float, friction_rate: float, deviation: float) -> floa
     ratio = deviation / friction_rate
     if ratio == 0.0:
         return friction / friction_rate
-    t = min(WIDE, TALL * ratio) * NODES
+    t = min(SECH_LIMIT, NORMAL_LIMIT * ratio) * TRAPEZOID_NODES
     density = np.exp(-((t / ratio) ** 2) / 2.0) / (np.sqrt(2.0 * np.pi) * ratio)
     return friction / friction_rate * float((density / np.cosh(t) ** 2).sum() * (t[1] - t[0]))
 
@@ -57,9 +57,9 @@ def of_travel(spring: SpringDamper, mean: float, deviation: float) -> tuple[floa
     """Statistical linearisation of the curve over travel (m): mean force (N), gain (N/m), and variance (N^2) of the
     remaining force."""
     force, gain = of_curve(spring.travel_force, mean, deviation)
-    x = deviation * POINTS
+    x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.travel_force, mean + x)
-    return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
+    return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
 
 def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float]:
@@ -67,13 +67,13 @@ def of_rate(spring: SpringDamper, deviation: float) -> tuple[float, float, float
     (N^2) of the remaining force."""
     force, gain = of_curve(spring.rate_force, 0.0, deviation)
     gain += of_friction(spring.friction, spring.friction_rate, deviation)
-    x = deviation * POINTS
+    x = deviation * EXPECTATION_POINTS
     law = _curve_at(spring.rate_force, x) + spring.friction * np.tanh(x / spring.friction_rate)
-    return force, gain, float(WEIGHTS @ (law - force - gain * x) ** 2)
+    return force, gain, float(EXPECTATION_WEIGHTS @ (law - force - gain * x) ** 2)
 
 
-POINTS = np.linspace(-8.0, 8.0, 2001)
-WEIGHTS = np.exp(-(POINTS**2) / 2.0) / np.exp(-(POINTS**2) / 2.0).sum()
+EXPECTATION_POINTS = np.linspace(-8.0, 8.0, 2001)
+EXPECTATION_WEIGHTS = np.exp(-(EXPECTATION_POINTS**2) / 2.0) / np.exp(-(EXPECTATION_POINTS**2) / 2.0).sum()
 """Of expectations over the normal distribution: good to 1e-4 for laws with corners, enough for what is left out."""
 
 

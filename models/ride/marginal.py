@@ -17,19 +17,19 @@ from scipy.linalg import expm, matrix_balance, schur, svd, svdvals
 
 from models.core.errors import InputError
 
-ACCURACY = 1e-10
+MATRIX_ACCURACY = 1e-10
 """Relative accuracy of a system matrix where nothing else is known: formulas reach 1e-15, engines that differentiate
 curves with corners 1e-11. A motion with a rate below this share of the fastest one (some 1e-8 1/s) counts as free."""
 ZERO_MARGIN = 1e3
 """What should vanish is told from zero if it is this many times larger than the accuracy allows."""
 
 
-ROUNDING = 10 * float(np.finfo(float).eps)
+ZERO_PRODUCT_SHARE = 10 * float(np.finfo(float).eps)
 """A product of rows and columns no larger than this share of its terms is zero by symmetry, and all of it rounding."""
 
 
 class Unstable(InputError):
-    """The system leaves its equilibrium without excitation: ``growth`` in 1/s, ``frequency`` in Hz."""
+    """The system leaves its equilibrium without excitation: ``variance_growth`` in 1/s, ``frequency`` in Hz."""
 
     def __init__(self, growth: float, frequency: float, speed: float | None = None) -> None:
         self.growth, self.frequency = growth, frequency
@@ -50,8 +50,8 @@ class MarginalParts:
 
     M (k, k) has its eigenvalues on the imaginary axis, the first ``zeros`` of its rows those at 0 (nilpotent), the
     others undamped oscillations; S is stable. V and W are in extended precision.
-    scale (n,): sizes of the states that balance A; rounding is relative to them. fastest: norm of A, 1/s.
-    neglected: largest rate that was taken for 0, by the slowest of the stable part.
+    scale (n,): sizes of the states that balance A; rounding is relative to them. norm_of_rates: norm of A, 1/s.
+    neglected_rate_ratio: largest rate that was taken for 0, by the slowest of the stable part.
     """
 
     M: np.ndarray
@@ -62,22 +62,22 @@ class MarginalParts:
     W: np.ndarray
     zeros: int
     scale: np.ndarray
-    fastest: float
-    neglected: float
+    norm_of_rates: float
+    neglected_rate_ratio: float
 
     @property
-    def marginal(self) -> int:
+    def count_of_marginal_states(self) -> int:
         """Number of marginal states, those with eigenvalues on the imaginary axis."""
         return len(self.M)
 
 
-def split_marginal(A: np.ndarray, accuracy: float = ACCURACY) -> MarginalParts:
+def split_marginal(A: np.ndarray, accuracy: float = MATRIX_ACCURACY) -> MarginalParts:
     """Marginal and stable part of x' = A x + u, with A (n, n); raises Unstable, or InputError where they cannot be
     separated.
 
     ``accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
-    balanced, scale, norm = _balanced(A)
+    balanced, scale, norm = _balanced_matrix(A)
     V, form, zeros, left = _zeros_first(balanced, accuracy * norm)
     if zeros and accuracy * norm > FREE_ROUNDING:
         _refuse(norm)
@@ -120,7 +120,7 @@ def _refuse(fastest: float) -> None:
     )
 
 
-def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _balanced_matrix(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """A after scaling the states to similar size, these scales (n,), and the norm of A as LAPACK balances it (1/s).
 
     LAPACK counts diagonals in: a road filter whose corner is almost 0 would get a size of almost 0, and beside its
@@ -200,7 +200,7 @@ def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     values, vectors = np.linalg.eig(A)
     T = np.where(values.imag < 0, vectors.imag, vectors.real)
     same = np.eye(len(A), dtype=np.longdouble)
-    if len(A) == 0 or not np.linalg.cond(T) < PARALLEL:
+    if len(A) == 0 or not np.linalg.cond(T) < LARGEST_CONDITION:
         return A, same, same
     back = np.linalg.inv(T).astype(np.longdouble)
     wide = T.astype(np.longdouble)
@@ -208,7 +208,7 @@ def _by_motions(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return (back @ A.astype(np.longdouble) @ wide).astype(float), wide, back
 
 
-PARALLEL = 1e8
+LARGEST_CONDITION = 1e8
 """Condition beyond which eigenvectors are of no use as coordinates."""
 
 
@@ -220,14 +220,14 @@ class Growth:
     power: np.ndarray
 
 
-def growth(
+def variance_growth(
     split: MarginalParts,
     B: Sequence[np.ndarray],
     delays: Sequence[float],
     C: np.ndarray,
     independent: bool,
     variance: np.ndarray,
-    accuracy: float = ACCURACY,
+    accuracy: float = MATRIX_ACCURACY,
 ) -> Growth:
     """Long-run growth of the variances of y = C x along the marginal motions, under noise through B_i (n, k) with
     delays tau_i (s).
@@ -237,16 +237,16 @@ def growth(
     if it is not free but dies out too slowly to tell, would still add to the ``variance`` (p,) of all others.
     """
     join = np.hstack if independent else sum
-    carried = [np.eye(split.marginal) if independent else expm(-split.M * delay) for delay in delays]
+    carried = [np.eye(split.count_of_marginal_states) if independent else expm(-split.M * delay) for delay in delays]
     G = join([E @ split.W0 @ b for E, b in zip(carried, B, strict=True)])
     reach = np.linalg.norm(split.W0 * split.scale, axis=1, keepdims=True)
     G_size = join(
         [abs(E) @ reach * np.linalg.norm(b / split.scale[:, None], axis=0) for E, b in zip(carried, B, strict=True)]
     )
     seen = C @ split.V0
-    seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.marginal)
+    seen_size = np.linalg.norm(C * split.scale, axis=1, keepdims=True) * np.ones(split.count_of_marginal_states)
     z, least = split.zeros, ZERO_MARGIN * accuracy
-    most = least * variance * 2 * accuracy * split.fastest
+    most = least * variance * 2 * accuracy * split.norm_of_rates
     rate, power = _of_zeros(split.M[:z, :z], G[:z], G_size[:z], seen[:, :z], seen_size[:, :z], least, most)
     swung = _of_undamped(split.M[z:, z:], G[z:], G_size[z:], seen[:, z:], seen_size[:, z:], least, most)
     rate = np.where(power <= 1, rate + swung, rate)
@@ -269,7 +269,7 @@ def _of_zeros(
     for level in range(len(N)):
         factor = C @ step / factorial(level)
         told = (abs(factor) * factorial(level) > lower_bound * (C_size @ step_size)).any(axis=1)
-        real = (abs(factor) > ROUNDING * (C_size @ step_size)).any(axis=1)
+        real = (abs(factor) > ZERO_PRODUCT_SHARE * (C_size @ step_size)).any(axis=1)
         told |= (level == 0) & real & ((factor**2).sum(axis=1) > upper_bound)
         rate[told] = (factor[told] ** 2).sum(axis=1) / (2 * level + 1)
         power[told] = 2 * level + 1
@@ -296,7 +296,7 @@ def _of_undamped(
         first = bool(same[: np.flatnonzero(values == value)[0]].any())
         amplitude = right[:, same] @ left[same]
         told = (abs(amplitude) > lower_bound * (C_size @ G_size)).any(axis=1)
-        real = (abs(amplitude) > ROUNDING * (C_size @ G_size)).any(axis=1)
+        real = (abs(amplitude) > ZERO_PRODUCT_SHARE * (C_size @ G_size)).any(axis=1)
         told |= real & (2 * (abs(amplitude) ** 2).sum(axis=1) > upper_bound)
         rate[told] += 0.0 if first else 2 * (abs(amplitude[told]) ** 2).sum(axis=1)
     return rate

@@ -11,7 +11,7 @@ from models.core.errors import InputError
 
 def share_beyond(deviation: float, limit: float) -> float:
     """Share of time for which abs(x) > limit, from the standard deviation of x; the unit of both is that of x."""
-    _check(deviation=deviation, limit=limit)
+    _check_value(deviation=deviation, limit=limit)
     return 0.0 if deviation == 0.0 else math.erfc(limit / (math.sqrt(2.0) * deviation))
 
 
@@ -21,7 +21,7 @@ def exceedances(deviation: float, rate_deviation: float, limit: float) -> float:
 
     Rice's formula, both sides together: (sd x' / sd x) exp(-limit^2 / (2 sd^2)) / pi.
     """
-    _check(deviation=deviation, rate_deviation=rate_deviation, limit=limit)
+    _check_value(deviation=deviation, rate_deviation=rate_deviation, limit=limit)
     if deviation == 0.0:
         return 0.0
     return rate_deviation / (math.pi * deviation) * math.exp(-((limit / deviation) ** 2) / 2.0)
@@ -32,13 +32,13 @@ def dynamic_load_factor(deviation: float, static: float) -> float:
 
     At three standard deviations the load is then gone, which a linear vehicle does not notice.
     """
-    _check(deviation=deviation)
+    _check_value(deviation=deviation)
     if not 0.0 < static < math.inf:
         raise InputError("", "static", static, "must be a wheel's load above 0, in N")
     return deviation / static
 
 
-def _check(**given: float) -> None:
+def _check_value(**given: float) -> None:
     """Raise InputError for a negative value or one that is not a number."""
     for name, value in given.items():
         if not 0.0 <= value < math.inf:

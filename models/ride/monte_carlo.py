@@ -3,7 +3,7 @@
 Within a cell the road's white noise is what its Legendre series says: coefficients of unit variance, independent, the
 same for every axle that crosses the cell, however much later and at whatever speed. The response to each coefficient
 is a sum of powers of the cell's matrix, and products of these responses are the joint covariance of all axles'
-responses to the cell, down to ``MODES``: no step error, at any length of cell that the series converges for.
+responses to the cell, down to ``LEGENDRE_MODES``: no step error, at any length of cell that the series converges for.
 
 A cell of length d crossed in time h has the matrix h A0 + d A1 of x' = (A0 + v A1) x: exact at constant speed; where
 the speed varies, it is taken as even within one cell.
@@ -17,26 +17,26 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.core.errors import InputError
-from models.core.noise import BLOCK, ROAD, normal
-from models.ride.covariance import FINITE, stationary
+from models.core.noise import ROAD, SAMPLES_PER_BLOCK, normal_samples
+from models.ride.covariance import FINITE, stationary_covariance
 from models.ride.excited import DelayedSystem
-from models.ride.road_in_path import at_speed, powers
+from models.ride.road_in_path import at_speed, power_terms
 from models.ride.speed_profile import SpeedProfile
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
-MODES = 8
+LEGENDRE_MODES = 8
 """Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where LARGEST_RATE_TIMES_CELL
 is full."""
 LARGEST_RATE_TIMES_CELL = 2.0
 """Fastest rate of vehicle or road times the cell, at most."""
-TERMS = 30
+SERIES_TERMS = 30
 """Of the series in powers of a cell's matrix: 2^30 / 30! = 4e-24."""
 SLOWEST_DECAY = 1e-6
 """Rate (1/s) below which a motion does not die out in any run."""
-FORGOTTEN = 9.0
+FORGETTING_EXPONENT = 9.0
 """Slowest rate times the time that copies, begun at zero, run before they count: e^-18 of a variance is missing."""
-TOLERANCE = 1e-3
+AXLE_SHIFT_TOLERANCE = 1e-3
 """How far (m) an axle may be moved so that all distances are whole numbers of cells: 0.1 ms at 10 m/s."""
 
 
@@ -117,7 +117,9 @@ def at_constant_speed(
     return cells.estimate(np.array([duration]), rows, copies)
 
 
-def path_cell(lengths: Sequence[float], longest: float, tolerance: float = TOLERANCE) -> tuple[float, np.ndarray]:
+def path_cell(
+    lengths: Sequence[float], longest: float, tolerance: float = AXLE_SHIFT_TOLERANCE
+) -> tuple[float, np.ndarray]:
     """Length (m) of a path cell, at most ``longest``, and by how many cells each axle is behind the first.
 
     All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
@@ -143,7 +145,7 @@ class _Cells:
             return at_speed(vehicle, excitation, speed, weightings)
 
         self.at_unit_speed, self.at_double_speed = system(1.0), system(2.0)
-        self.finite = np.array([status == FINITE for status in stationary(system(slowest)).status])
+        self.finite = np.array([status == FINITE for status in stationary_covariance(system(slowest)).status])
         fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
         self.length, self.shifts = path_cell(excitation.lengths, LARGEST_RATE_TIMES_CELL / fastest)
         self.at_rest, self.per_speed = (
@@ -157,33 +159,35 @@ class _Cells:
         if slowest < SLOWEST_DECAY:
             said = "has a motion that does not die out: a copy never forgets its beginning"
             raise InputError("", "vehicle", None, said)
-        return int(np.ceil(FORGOTTEN / slowest * speed / self.length))
+        return int(np.ceil(FORGETTING_EXPONENT / slowest * speed / self.length))
 
     def states(self, durations: np.ndarray, copies: int, seed: int) -> Iterator[np.ndarray]:
         """States (n, copies) at the end of each cell; ``durations`` : times (s) in which the first axle crosses the
         cells."""
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
-        draws = _draw_coefficients(seed, copies, k * MODES * (axles if independent else 1))
+        draws = _draw_coefficients(seed, copies, k * LEGENDRE_MODES * (axles if independent else 1))
         last = int(self.shifts[-1])
         met = deque((next(draws) for _ in range(last)), maxlen=last + 1)
         x, before = np.zeros((len(self.at_rest), copies)), None
         for duration in durations:
             met.append(next(draws))
             if duration != before:
-                E, R = self._crossed(duration)
+                E, R = self._cell_transition(duration)
                 before = duration
             noise = [met[-1]] if independent else [met[-1 - shift] for shift in self.shifts]
             x = E @ x + R @ np.concatenate(noise)
             yield x
 
-    def _crossed(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Transition matrix (n, n) over a cell, and responses (n, a k MODES) to the noise in it, axle by axle."""
+    def _cell_transition(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Transition matrix (n, n) over a cell, and responses (n, a k LEGENDRE_MODES) to the noise in it, axle by
+        axle.
+        """
         matrix = duration * self.at_rest + self.length * self.per_speed
         rows = [np.stack(self.at_unit_speed.B, axis=1) * self.length**0.5]
-        for _ in range(TERMS - 1):
+        for _ in range(SERIES_TERMS - 1):
             rows.append(np.tensordot(matrix, rows[-1], 1))
-        responses = np.einsum("jnak,jl->nakl", np.stack(rows), _legendre())
+        responses = np.einsum("jnak,jl->nakl", np.stack(rows), _legendre_integrals())
         return expm(matrix), responses.reshape(len(matrix), -1)
 
     def outputs(self, x: np.ndarray, speed: float) -> np.ndarray:
@@ -197,12 +201,14 @@ class _Cells:
         return VarianceEstimate(self.at_unit_speed.names, time, moments[:, 0], moments[:, 1], copies)
 
 
-def _legendre() -> np.ndarray:
-    """Integrals (TERMS, MODES) of (1 - u)^j / j! times the orthonormal Legendre polynomials over 0 to 1."""
-    points, weights = np.polynomial.legendre.leggauss(TERMS)
-    degree = np.sqrt(2.0 * np.arange(MODES) + 1.0)
-    basis = np.polynomial.legendre.legvander(points, MODES - 1) * degree
-    return np.einsum("u,uj,ul->jl", weights / 2.0, powers((1.0 - points) / 2.0, TERMS), basis)
+def _legendre_integrals() -> np.ndarray:
+    """Integrals (SERIES_TERMS, LEGENDRE_MODES) of (1 - u)^j / j! times the orthonormal Legendre polynomials over 0 to
+    1.
+    """
+    points, weights = np.polynomial.legendre.leggauss(SERIES_TERMS)
+    degree = np.sqrt(2.0 * np.arange(LEGENDRE_MODES) + 1.0)
+    basis = np.polynomial.legendre.legvander(points, LEGENDRE_MODES - 1) * degree
+    return np.einsum("u,uj,ul->jl", weights / 2.0, power_terms((1.0 - points) / 2.0, SERIES_TERMS), basis)
 
 
 def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.ndarray]:
@@ -210,7 +216,7 @@ def _draw_coefficients(seed: int, copies: int, channels: int) -> Iterator[np.nda
 
     Several cells are drawn from the same block of noise if there are few copies.
     """
-    together, path = max(1, BLOCK // copies), 0
+    together, path = max(1, SAMPLES_PER_BLOCK // copies), 0
     while True:
-        yield from normal(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT
+        yield from normal_samples(seed, path, together * copies, channels, source=ROAD).reshape(together, copies, -1).mT
         path += 1

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.copies_kernel import POWERS, Curves, Laws, PushingTyres, march
+from models.ride.copies_kernel import POWERS_SUMMED, Curves, Laws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
 from models.road.excitation import Excitation
@@ -24,11 +24,11 @@ from models.vehicles.spatial_linear import Gains, linearise, preloads
 LARGEST_RATE_TIMES_STEP, STEEPEST = 0.25, 0.5
 """Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.
 Deviations of a quarter car are then too large by 0.05 to 0.1 %, by the covariance of the steps themselves."""
-BLOCK = 200
+STEPS_PER_BLOCK = 200
 """Steps between two portions of road."""
 STEPS_PER_READING = 4
 """Steps from one reading of the outputs to the next, which know of each other anyway."""
-SETTLE = 9.0
+SETTLING_EXPONENT = 9.0
 """Slowest rate times the time that copies, begun at rest, run before they count."""
 SLOWEST_DECAY_SHARE = 1e-6
 """Share of the largest decay rate below which a motion counts as one that nothing pulls back."""
@@ -38,14 +38,14 @@ SLOWEST_DECAY_SHARE = 1e-6
 class Copies:
     """Outputs of the copies in time: per copy (copies, p) the means of y, y^2, y^3 and y^4 over the counted time.
 
-    step (s) of the runs, ``duration`` (s) that counts after ``settling`` steps.
+    step (s) of the runs, ``duration`` (s) that counts after ``settling_steps`` steps.
     """
 
     names: tuple[str, ...]
     moments: np.ndarray
     step: float
     duration: float
-    settling: int
+    settling_steps: int
 
     @property
     def mean(self) -> np.ndarray:
@@ -108,12 +108,12 @@ def copies_in_time(
     check_rates(vehicle, excitation)
     replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
     road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
-    settling, counted = int(np.ceil(forgotten(replaced) / road.step)), int(np.ceil(duration / road.step))
+    settling, counted = int(np.ceil(settling_time(replaced) / road.step)), int(np.ceil(duration / road.step))
     march = CopiesMarch(vehicle, speed, road.step, copies)
-    for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
-        left = settling + counted - number * BLOCK
-        march.over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * BLOCK))
-        if left <= BLOCK:
+    for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
+        left = settling + counted - number * STEPS_PER_BLOCK
+        march.march_over(portion[: 2 * left + 1], _steps_to_first_output(settling, number * STEPS_PER_BLOCK))
+        if left <= STEPS_PER_BLOCK:
             break
     moments = march.sums.swapaxes(1, 2) / len(range(0, counted, STEPS_PER_READING))
     return Copies(march.plain.names, moments, road.step, counted * road.step, settling)
@@ -130,12 +130,12 @@ def coarser_variances(
     long."""
     copies = len(fine.moments[0])
     kept, road = max(1, math.ceil(RERUN_SHARE * copies)), RoadPath(excitation, speed, fine.step / 2.0)
-    settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
-    block, every = BLOCK // times, STEPS_PER_READING // times
+    settling, counted = fine.settling_steps // times, round(fine.duration / fine.step) // times
+    block, every = STEPS_PER_BLOCK // times, STEPS_PER_READING // times
     march = CopiesMarch(vehicle, speed, times * fine.step, kept)
-    for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
+    for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):
         left = settling + counted - number * block
-        march.over(
+        march.march_over(
             portion[: 2 * times * left + 1 : times, :, :kept].copy(),
             _steps_to_first_output(settling, number * block, every),
             every,
@@ -154,32 +154,32 @@ class CopiesMarch:
         springs = nonlinear_springs(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
         self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
-        self.sums = np.zeros((POWERS, len(self.plain.outputs), copies))
+        self.sums = np.zeros((POWERS_SUMMED, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
-    def over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
+    def march_over(self, roads: np.ndarray, first: int, stride: int = STEPS_PER_READING) -> None:
         """Continue the motion over roads (2 steps + 1, 2 w, copies), read every half step; outputs count from step
         ``first``."""
         if self.states is None:
-            self.states = np.vstack([_standing(self.plain, roads[0])] * 2)
+            self.states = np.vstack([_static_positions(self.plain, roads[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
         march(self.states, roads, self.step, first, stride, self.laws, self.sums)
 
 
 def usual_step(vehicle: SpatialVehicle, speed: float, equivalent: LinearVehicle) -> float:
     """Step (s) for a nonlinear vehicle, from its statistically linearised ``equivalent``."""
-    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), followed(vehicle, speed))
+    return min(LARGEST_RATE_TIMES_STEP / float(abs(poles(equivalent)).max()), longest_resolving_step(vehicle, speed))
 
 
-def forgotten(equivalent: LinearVehicle) -> float:
+def settling_time(equivalent: LinearVehicle) -> float:
     """Time (s) after which copies no longer depend on their initial state."""
     decay = abs(poles(equivalent).real)
-    return SETTLE / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
+    return SETTLING_EXPONENT / float(decay[decay > SLOWEST_DECAY_SHARE * decay.max()].min())
 
 
-def followed(vehicle: SpatialVehicle, speed: float) -> float:
+def longest_resolving_step(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that resolves the vehicle's motion when its springs are as stiff as they can become."""
-    steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in nonlinear_springs(vehicle)})
+    steepest = linearise(vehicle, speed, {s.name: _steepest_gains(s) for s in nonlinear_springs(vehicle)})
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
@@ -188,20 +188,20 @@ def _steps_to_first_output(settling: int, completed: int, stride: int = STEPS_PE
     return settling - completed if completed <= settling else (settling - completed) % stride
 
 
-def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
+def _static_positions(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
     """Positions (n, copies) of static equilibrium on a road (2 w, copies). Vehicles that start far above the road would
     oscillate for long."""
     heights = road[: plain.road_stiffness.shape[1]]
     return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
 
 
-def _steepest(spring: SpringDamper) -> Gains:
+def _steepest_gains(spring: SpringDamper) -> Gains:
     """Largest stiffness (N/m) and damping (N s/m) of a spring's curves."""
-    travel, rate = (_slopes(curve).max() for curve in (spring.travel_force, spring.rate_force))
+    travel, rate = (_slopes_at_rest(curve).max() for curve in (spring.travel_force, spring.rate_force))
     return spring.stiffness + travel, spring.damping + rate + spring.friction / spring.friction_rate
 
 
-def _slopes(curve: Curve | None) -> np.ndarray:
+def _slopes_at_rest(curve: Curve | None) -> np.ndarray:
     if curve is None:
         return np.zeros(1)
     _, slope, _, bends = curve.hinges()
@@ -242,11 +242,11 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
         rows,
         motion,
         read,
-        _curves([s.travel_force for s in springs]),
-        _curves([s.rate_force for s in springs]),
+        _padded_curves([s.travel_force for s in springs]),
+        _padded_curves([s.rate_force for s in springs]),
         np.array([s.friction for s in springs], dtype=float),
         np.array([s.friction_rate for s in springs], dtype=float),
-        _pushing(vehicle, pushing, heights),
+        _pushing_tyres(vehicle, pushing, heights),
     )
 
 
@@ -255,7 +255,7 @@ def _part_of_output(output: SpatialOutput) -> str:
     return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
 
 
-def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
+def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
     """``PushingTyres`` of tyres that only push; ``heights`` (u, n) : rise of each tyre's wheel per coordinate."""
     loads = preloads(vehicle).tyres if tyres else {}
     load, stiffness, damping = (
@@ -267,7 +267,7 @@ def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray
     return PushingTyres(wheel, load, stiffness, damping, heights)
 
 
-def _curves(curves: Sequence[Curve | None]) -> Curves:
+def _padded_curves(curves: Sequence[Curve | None]) -> Curves:
     """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets one that is 0 everywhere."""
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
     most = max((len(corners) for _, _, corners, _ in known), default=0)

@@ -19,9 +19,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from models.ride.excited import DelayedSystem, excited
-from models.ride.speed_profile import POINTS, WEIGHTS, SpeedProfile
-from models.ride.weighting import weighted
+from models.ride.excited import DelayedSystem, vehicle_with_road
+from models.ride.speed_profile import UNIT_POINTS, UNIT_WEIGHTS, SpeedProfile
+from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
@@ -36,7 +36,7 @@ class RoadInPath:
     """
 
     A: np.ndarray
-    inputs: np.ndarray
+    noise_inputs: np.ndarray
     basis: np.ndarray
     C: np.ndarray
     rate: np.ndarray
@@ -84,10 +84,10 @@ def at_speed(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, weightings: Mapping[str, str] | None = None
 ) -> DelayedSystem:
     """The system at a constant speed (m/s, above 0)."""
-    return weighted(excited(vehicle, excitation, speed), weightings or {})
+    return system_with_weightings(vehicle_with_road(vehicle, excitation, speed), weightings or {})
 
 
-TERMS = 24
+SERIES_TERMS = 24
 """Of exponential series within a step, where rate times time is about 1: 1.5^24 / 24! = 3e-20."""
 
 
@@ -100,16 +100,18 @@ class Responses:
     def __init__(self, road_in_path: RoadInPath, profile: SpeedProfile) -> None:
         F, G = road_in_path.excitation.F, road_in_path.excitation.G
         self.form, self.profile, self.path = road_in_path, profile, profile.path
-        self.n, self.axles, self.m = road_in_path.inputs.shape
-        self.decay, self.noise = series(F, np.eye(self.m)), series(F, G)
-        self.motion = [series(road_in_path.A, road_in_path.inputs[:, axle]) for axle in range(self.axles)]
+        self.n, self.axles, self.m = road_in_path.noise_inputs.shape
+        self.decay, self.noise = exponential_series(F, np.eye(self.m)), exponential_series(F, G)
+        self.motion = [
+            exponential_series(road_in_path.A, road_in_path.noise_inputs[:, axle]) for axle in range(self.axles)
+        ]
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
     def transition(self, start: float, end: float) -> np.ndarray:
         """Transition matrix E (n + a m, n + a m) over a step from start to end (s)."""
         motion, inputs = self.of_length(round(end - start, 14))
-        driven = self.path(start + (end - start) * np.append(POINTS, 1.0)) - self.path(start)
-        decay = (powers(driven, TERMS) @ self.decay).reshape(-1, self.m)
+        driven = self.path(start + (end - start) * np.append(UNIT_POINTS, 1.0)) - self.path(start)
+        decay = (power_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion
         E[: self.n, self.n :] = (inputs @ decay[: -self.m]).reshape(self.n, -1)
@@ -120,8 +122,8 @@ class Responses:
     def _of_length(self, length: float) -> tuple[np.ndarray, np.ndarray]:
         """Matrix exponential e^(A h) over a length h, and the effect of inputs at the points of the step through e^(A
         (h - u)): (n a, g m)."""
-        left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in POINTS])
-        inputs = np.einsum("g,gij,jam->iagm", WEIGHTS * length, left, self.form.inputs, optimize=True)
+        left = np.stack([expm(self.form.A * length * (1.0 - point)) for point in UNIT_POINTS])
+        inputs = np.einsum("g,gij,jam->iagm", UNIT_WEIGHTS * length, left, self.form.noise_inputs, optimize=True)
         return expm(self.form.A * length), inputs.reshape(self.n * self.axles, -1)
 
     def to_noise(self, axle: int, met: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -130,29 +132,29 @@ class Responses:
         Each pair of times lies in one step.
         """
         left = (end - met)[:, None]
-        driven = self.path(met[:, None] + left * POINTS) - self.path(met)[:, None]
+        driven = self.path(met[:, None] + left * UNIT_POINTS) - self.path(met)[:, None]
         k = self.noise.shape[1] // self.m
-        road = (powers(driven, TERMS) @ self.noise) * (left * WEIGHTS)[..., None]
-        weighted = np.swapaxes(powers(left * (1.0 - POINTS), TERMS), 1, 2) @ road
+        road = (power_terms(driven, SERIES_TERMS) @ self.noise) * (left * UNIT_WEIGHTS)[..., None]
+        weighted = np.swapaxes(power_terms(left * (1.0 - UNIT_POINTS), SERIES_TERMS), 1, 2) @ road
         out = np.zeros((self.n + self.axles * self.m, len(met), k))
-        columns = weighted.reshape(-1, TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(TERMS * self.m, -1)
-        motion = self.motion[axle].reshape(TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
+        columns = weighted.reshape(-1, SERIES_TERMS, self.m, k).transpose(1, 2, 0, 3).reshape(SERIES_TERMS * self.m, -1)
+        motion = self.motion[axle].reshape(SERIES_TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
         out[: self.n] = (motion @ columns).reshape(self.n, -1, k)
-        now = powers(self.path(end) - self.path(met), TERMS) @ self.noise
+        now = power_terms(self.path(end) - self.path(met), SERIES_TERMS) @ self.noise
         rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
         out[rows] = now.reshape(-1, self.m, k).transpose(1, 0, 2)
         return out
 
 
-def series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+def exponential_series(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """Vectors A^j B, flattened, in row j, such that e^(A t) B = powers(t) @ series."""
     rows = [B]
-    for _ in range(TERMS - 1):
+    for _ in range(SERIES_TERMS - 1):
         rows.append(A @ rows[-1])
     return np.stack([row.ravel() for row in rows])
 
 
-def powers(t: np.ndarray, count: int) -> np.ndarray:
+def power_terms(t: np.ndarray, count: int) -> np.ndarray:
     """t^j / j! along a new last axis, j = 0 to count - 1."""
     out = np.ones((*np.shape(t), count))
     out[..., 1:] = np.asarray(t)[..., None] / np.arange(1, count)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 
 from models.core.errors import InputError
-from models.core.noise import ROAD, normal
+from models.core.noise import ROAD, normal_samples
 from models.ride.monte_carlo import path_cell
 from models.road.excitation import Excitation
 from models.vehicles.spatial import SpatialVehicle
@@ -59,7 +59,7 @@ class RoadPath:
         met, moved = np.empty((0, len(F), copies)), np.empty((len(F), copies))
         while True:
             fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
-            drawn = normal(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            drawn = normal_samples(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
             drawn = np.concatenate(
                 [met[-1:] if len(met) else _stationary_root(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
             )
@@ -121,17 +121,17 @@ def _transition_over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.nd
     covariance = move @ block[:m, m:]
     for _ in range(halved):
         covariance, move = covariance + move @ covariance @ move.T, move @ move
-    return move, _root(covariance)
+    return move, _covariance_root(covariance)
 
 
 def _stationary_root(F: np.ndarray, G: np.ndarray) -> np.ndarray:
     """Root of the stationary covariance of the filter state; zeros if the road is a random walk."""
     if np.linalg.eigvals(F).real.max() >= 0.0:
         return np.zeros_like(F)
-    return _root(solve_continuous_lyapunov(F, -G @ G.T))
+    return _covariance_root(solve_continuous_lyapunov(F, -G @ G.T))
 
 
-def _root(P: np.ndarray) -> np.ndarray:
+def _covariance_root(P: np.ndarray) -> np.ndarray:
     """Root S of S S' = P for a symmetric P that is positive semidefinite except for rounding."""
     values, vectors = np.linalg.eigh((P + P.T) / 2.0)
     return vectors * np.sqrt(values.clip(0.0))

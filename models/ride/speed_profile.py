@@ -24,7 +24,7 @@ class SpeedProfile:
         if len(self.times) != len(self.speeds) or len(self.times) < 2:
             sizes = f"{len(self.times)} times, {len(self.speeds)} speeds"
             raise InputError(file, place, sizes, "must be a table of two points or more, a time and a speed each")
-        _check(
+        _check_values(
             self.speeds,
             (self.speeds >= 0.0) & np.isfinite(self.speeds),
             f"{place}.speed",
@@ -32,7 +32,7 @@ class SpeedProfile:
             file,
         )
         rises = np.append(True, np.diff(self.times) > 0.0) & np.isfinite(self.times)
-        _check(self.times, rises, f"{place}.time", "must rise from point to point, in s", file)
+        _check_values(self.times, rises, f"{place}.time", "must rise from point to point, in s", file)
         pieces = np.diff(self.times)
         self.accelerations = np.append(np.diff(self.speeds) / pieces, 0.0)
         self.paths = np.append(0.0, np.cumsum(pieces * (self.speeds[1:] + self.speeds[:-1]) / 2.0))
@@ -64,21 +64,23 @@ class SpeedProfile:
         return self.times[piece] + since
 
 
-def _check(values: np.ndarray, valid: np.ndarray, place: str, allowed: str, file: str) -> None:
+def _check_values(values: np.ndarray, valid: np.ndarray, place: str, allowed: str, file: str) -> None:
     """Raise InputError for the first value that is not valid."""
     if not valid.all():
         at = int(np.argmin(valid))
         raise InputError(file, f"{place}.{at}", float(values[at]), allowed)
 
 
-NODES = 5
-"""Points of Gauss's integral in a cell, good to the power 2 NODES of its length."""
-POINTS, WEIGHTS = (half / 2.0 for half in (np.polynomial.legendre.leggauss(NODES) + np.array([[1.0], [0.0]])))
+GAUSS_NODES = 5
+"""Points of Gauss's integral in a cell, good to the power 2 GAUSS_NODES of its length."""
+UNIT_POINTS, UNIT_WEIGHTS = (
+    half / 2.0 for half in (np.polynomial.legendre.leggauss(GAUSS_NODES) + np.array([[1.0], [0.0]]))
+)
 """Points and weights of the integral from 0 to 1."""
 EQUAL_CUTS = 1e-11
 """Cuts (s) nearer to one another than this are one: 1e-9 m of road at most."""
 
-SHRINKING = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
+STANDSTILL_CUTS = np.outer((-1.0, 1.0), 4.0 ** -np.arange(1.0, 7.0)).ravel()
 """Cuts about a place of standstill, over the longest step."""
 
 
@@ -112,7 +114,7 @@ def steps(
     return np.concatenate(ends)
 
 
-def nodes(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
+def integration_points(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[float]) -> Nodes:
     """Integration points in cells. Cells end at every step's end, and wherever an axle passes a place at which a step
     ended.
 
@@ -120,22 +122,22 @@ def nodes(profile: SpeedProfile, step_ends: np.ndarray, distances: Sequence[floa
     vehicle may have stood. Near a standstill, where time depends on the root of the distance, cells become smaller.
     """
     path, ends_after = profile.path(step_ends), step_ends[step_ends >= profile.times[0]]
-    stops = _passing(profile, path[profile.speed(step_ends) == 0.0], distances)
-    shrinking = (stops[:, None] + np.diff(ends_after).max() * SHRINKING).ravel()
-    more = np.sort(np.concatenate([_passing(profile, path, distances), shrinking]))
+    stops = _passing_times(profile, path[profile.speed(step_ends) == 0.0], distances)
+    shrinking = (stops[:, None] + np.diff(ends_after).max() * STANDSTILL_CUTS).ravel()
+    more = np.sort(np.concatenate([_passing_times(profile, path, distances), shrinking]))
     more = more[(more > ends_after[0]) & (more < ends_after[-1])]
     after = np.searchsorted(ends_after, more)
     apart = np.minimum(ends_after[after] - more, more - ends_after[after - 1]) > EQUAL_CUTS
     apart &= np.diff(more, prepend=-np.inf) > EQUAL_CUTS
     cuts = np.sort(np.concatenate([ends_after, more[apart]]))
-    time = cuts[:-1, None] + np.diff(cuts)[:, None] * POINTS
-    weight = np.diff(cuts)[:, None] * WEIGHTS * profile.speed(time)
+    time = cuts[:-1, None] + np.diff(cuts)[:, None] * UNIT_POINTS
+    weight = np.diff(cuts)[:, None] * UNIT_WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)
     time, weight = time[moving].ravel(), weight[moving].ravel()
     return Nodes(time, weight, np.searchsorted(step_ends, time, side="right") - 1)
 
 
-def _passing(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:
+def _passing_times(profile: SpeedProfile, places: np.ndarray, distances: Sequence[float]) -> np.ndarray:
     """Times (s) at which any axle, one of ``distances`` behind the first, reaches the positions of the first."""
     different = np.unique(places)
     return np.concatenate([profile.time(different + distance) for distance in distances] or [np.zeros(0)])

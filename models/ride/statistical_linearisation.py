@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.ride.covariance import StationaryCovariance, stationary
-from models.ride.excited import DelayedSystem, excited
+from models.ride.covariance import StationaryCovariance, stationary_covariance
+from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.gaussian_laws import of_rate, of_travel
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
@@ -27,19 +27,19 @@ from models.vehicles.spatial_linear import Gains, linearise
 GAIN_TOLERANCE = 1e-12
 """Largest relative change of a gain at which the fixed point is reached."""
 MOST_ROUNDS = 400
-TRAVEL, RATE = 0.02, 0.3
+FIRST_TRAVEL_DEVIATION, FIRST_RATE_DEVIATION = 0.02, 0.3
 """Deviations (m, m/s) with which the first gains are taken: slopes at rest may leave a vehicle undamped."""
-GAUSSIAN = "it is nearly Gaussian"
+GAUSSIAN_REMARK = "it is nearly Gaussian"
 NOT_GAUSSIAN = "it is not Gaussian any more: no shares of time and exceedances from it"
-GRADES = ((0.01, 0.02, GAUSSIAN), (0.05, 0.06, GAUSSIAN), (0.1, 0.06, NOT_GAUSSIAN))
+ERROR_GRADES = ((0.01, 0.02, GAUSSIAN_REMARK), (0.05, 0.06, GAUSSIAN_REMARK), (0.1, 0.06, NOT_GAUSSIAN))
 """Left-out share of an output's variance, and the relative error of its deviation that was found up to there, beside
 Monte Carlo of quarter cars: dampers of two slopes and more, dry friction, stops, alone and together, on five levels of
 road at two speeds. Kurtosis, 3 for Gaussian ones, was 2.5 to 3.3 in the first two and up to 4 in the
 third."""
 EXTRAPOLATION_ERROR = 0.15
 """The error found beyond, with stops that are met at every second wave; kurtosis went up to 6."""
-NEWTON = 60
-HARMONIC = 2.0
+MOST_NEWTON_STEPS = 60
+HARMONIC_RATIO = 2.0
 """Left-out forces change at least twice as fast as what moves the spring: they are harmonics of its motion."""
 
 
@@ -52,7 +52,7 @@ class BentSpring:
     ``left_out``: share of the variance of its force that the gains leave out.
     """
 
-    gains: Gains
+    equivalent_gains: Gains
     travel: float
     deviation: float
     rate: float
@@ -65,7 +65,7 @@ class StatisticallyLinear:
     """The statistically linearised vehicle, its covariance and its means.
 
     mean, left_out (p,), by output: mean beside the equilibrium on a flat road (0 for accelerations), and the variance
-    that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``changes``: largest
+    that the left-out forces would add, by its own; ``sentences`` judge each output by it. ``gain_changes``: largest
     relative change of a gain, iteration after iteration; the last one is that of a fixed point.
     """
 
@@ -76,20 +76,20 @@ class StatisticallyLinear:
     springs: dict[str, BentSpring]
     left_out: np.ndarray
     sentences: tuple[str, ...]
-    changes: tuple[float, ...]
+    gain_changes: tuple[float, ...]
 
     @property
     def contraction(self) -> float:
         """Largest ratio of a change to the change one iteration before, among changes above rounding."""
-        seen = [after / before for before, after in pairwise(self.changes) if after > 100.0 * GAIN_TOLERANCE]
+        seen = [after / before for before, after in pairwise(self.gain_changes) if after > 100.0 * GAIN_TOLERANCE]
         return max(seen[len(seen) // 2 :], default=0.0)
 
     @property
-    def distance(self) -> float:
+    def fixed_point_distance(self) -> float:
         """Largest relative distance of the gains from the fixed point: last change * c / (1 - c) with contraction c,
         Banach's bound."""
         c = self.contraction
-        return self.changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
+        return self.gain_changes[-1] * c / (1.0 - c) if c < 1.0 else np.inf
 
 
 def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
@@ -114,7 +114,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).solved(scale)
+    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(scale)
 
 
 Law = tuple[float, float, float]
@@ -144,16 +144,20 @@ class _Search:
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
-    def solved(self, scale: float) -> StatisticallyLinear:
+    def iterate_to_fixed_point(self, scale: float) -> StatisticallyLinear:
         """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
-        first = _Moments(np.zeros(count), np.full(count, scale * TRAVEL), np.full(count, scale * RATE))
-        gains, position = self._gains(first), np.zeros(len(self.plain.mass))
+        first = _Moments(
+            np.zeros(count),
+            np.full(count, scale * FIRST_TRAVEL_DEVIATION),
+            np.full(count, scale * FIRST_RATE_DEVIATION),
+        )
+        gains, position = self._equivalent_gains(first), np.zeros(len(self.plain.mass))
         changes: list[float] = []
         part = 1.0
         while not changes or changes[-1] > GAIN_TOLERANCE:
             moments, position = self._spring_moments(gains, position)
-            wanted = self._gains(moments)
+            wanted = self._equivalent_gains(moments)
             changes.append(_largest_gain_change(wanted, gains))
             if len(changes) >= MOST_ROUNDS:
                 raise RunFailed(
@@ -166,37 +170,39 @@ class _Search:
             gains = gains + part * (wanted - gains)
         return self._result(gains, moments, position, changes)
 
-    def _gains(self, moments: _Moments) -> np.ndarray:
+    def _equivalent_gains(self, moments: _Moments) -> np.ndarray:
         """Equivalent stiffness and damping (springs, 2) of springs with the given moments of motion."""
-        laws = zip(self.springs, self._laws(moments), strict=True)
+        laws = zip(self.springs, self._linearised_laws(moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
+    def _linearised_laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
         """Statistical linearisation of each spring's laws over travel and over rate: mean force, gain, and variance of
         the force that the gain does not represent."""
         moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
         return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
 
-    def _replaced(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
+    def _linearised_vehicle(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
         return linearise(vehicle, self.speed, named)
 
     def _spring_moments(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
         """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
-        linear = self._replaced(gains, self.watched)
-        deviation = stationary(excited(linear, self.excitation, self.speed)).deviation[len(self.vehicle.outputs) :]
+        linear = self._linearised_vehicle(gains, self.watched)
+        deviation = stationary_covariance(vehicle_with_road(linear, self.excitation, self.speed)).deviation[
+            len(self.vehicle.outputs) :
+        ]
         if not np.isfinite(deviation).all():
             raise RunFailed("statistical linearisation", "the travel of a bent spring has no finite variance here")
         travel, rate = np.split(deviation, 2)
-        position = self._mean(travel, rate, position)
+        position = self._mean_position(travel, rate, position)
         return _Moments(self.rows @ position, travel, rate), position
 
-    def _mean(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
+    def _mean_position(self, travel: np.ndarray, rate: np.ndarray, position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
         stay 0."""
         damper = np.array([of_rate(s, r)[0] for s, r in zip(self.springs, rate, strict=True)])
-        for _ in range(NEWTON):
+        for _ in range(MOST_NEWTON_STEPS):
             laws = [of_travel(s, m, d) for s, m, d in zip(self.springs, self.rows @ position, travel, strict=True)]
             force, gain = np.array([law[:2] for law in laws]).reshape(-1, 2).T
             left = self.plain.stiffness @ position + self.rows.T @ (force + damper)
@@ -209,20 +215,27 @@ class _Search:
     def _result(
         self, gains: np.ndarray, moments: _Moments, position: np.ndarray, changes: list[float]
     ) -> StatisticallyLinear:
-        linear = self._replaced(gains, self.vehicle)
-        system = excited(linear, self.excitation, self.speed)
-        covariance = stationary(system)
+        linear = self._linearised_vehicle(gains, self.vehicle)
+        system = vehicle_with_road(linear, self.excitation, self.speed)
+        covariance = stationary_covariance(system)
         left = self._left_out(linear, moments, system, covariance)
-        springs = {s.name: self._spring(i, gains[i], moments) for i, s in enumerate(self.springs)}
+        springs = {s.name: self._spring_in_motion(i, gains[i], moments) for i, s in enumerate(self.springs)}
         told = zip(covariance.names, left, covariance.status, strict=True)
-        sentences = tuple(_sentence(*each) for each in told)
+        sentences = tuple(_left_out_sentence(*each) for each in told)
         return StatisticallyLinear(
-            linear, system, covariance, self._means(springs, linear, position), springs, left, sentences, tuple(changes)
+            linear,
+            system,
+            covariance,
+            self._output_means(springs, linear, position),
+            springs,
+            left,
+            sentences,
+            tuple(changes),
         )
 
-    def _spring(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
+    def _spring_in_motion(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
         s, mean, d, r = self.springs[i], float(moments.mean[i]), float(moments.travel[i]), float(moments.rate[i])
-        travel, rate = self._laws(moments)[i]
+        travel, rate = self._linearised_laws(moments)[i]
         lost = travel[2] + rate[2]
         total = lost + (gains[0] * d) ** 2 + (gains[1] * r) ** 2
         return BentSpring(
@@ -234,7 +247,7 @@ class _Search:
             float(lost / total) if total else 0.0,
         )
 
-    def _means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
+    def _output_means(self, springs: dict[str, BentSpring], linear: LinearVehicle, position: np.ndarray) -> np.ndarray:
         """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
         means = np.array([output.displacement_factors @ position for output in linear.outputs])
         for i, spec in enumerate(self.vehicle.outputs):
@@ -252,11 +265,15 @@ class _Search:
         n = len(linear.mass)
         jerk = self.rows @ system.A[n : 2 * n]
         change = np.sqrt(np.einsum("si,ij,sj->s", jerk, covariance.P, jerk).clip(0.0))
-        corners = np.concatenate([_ratio(moments.rate, moments.travel), _ratio(change, moments.rate)])
-        lost = np.array([[law[2] for law in laws] for laws in self._laws(moments)]).T.ravel()
-        forced = _forced(linear, np.vstack([self.rows, self.rows]), self._own_forces())
+        corners = np.concatenate(
+            [_corner_frequency(moments.rate, moments.travel), _corner_frequency(change, moments.rate)]
+        )
+        lost = np.array([[law[2] for law in laws] for laws in self._linearised_laws(moments)]).T.ravel()
+        forced = _vehicle_under_forces(linear, np.vstack([self.rows, self.rows]), self._own_forces())
         noise = np.diag(np.sqrt(2.0 * corners * lost))
-        added = stationary(excited(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0))
+        added = stationary_covariance(
+            vehicle_with_road(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
+        )
         usable = np.isfinite(covariance.variance) & (covariance.variance > 0) & np.isfinite(added.variance)
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
 
@@ -271,13 +288,13 @@ class _Search:
         )
 
 
-def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+def _corner_frequency(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
     """Corner frequency (1/s) of a residual force's spectrum, from the standard deviations of the spring's motion and of
     its rate."""
-    return HARMONIC * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
+    return HARMONIC_RATIO * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
 
 
-def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
+def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
     """The vehicle excited by forces along rows (f, n) instead of road heights; ``reading`` (p, f): direct effect of the
     forces on the outputs."""
     none = np.zeros(len(rows))
@@ -295,12 +312,12 @@ def _largest_gain_change(wanted: np.ndarray, gains: np.ndarray) -> float:
     return float((abs(wanted - gains) / size).max(initial=0.0))
 
 
-def _sentence(name: str, share: float, status: str) -> str:
+def _left_out_sentence(name: str, share: float, status: str) -> str:
     """Sentence on how much the neglected share of force may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "
-    for most, error, shape in GRADES:
+    for most, error, shape in ERROR_GRADES:
         if share <= most:
             return said + f"its deviation is good to {100 * error:.0f} %, and {shape}"
     return said + (
@@ -309,6 +326,6 @@ def _sentence(name: str, share: float, status: str) -> str:
     )
 
 
-def promised(share: float) -> float:
+def promised_error(share: float) -> float:
     """Relative error of an output's standard deviation that tests found not to be exceeded at this left-out share."""
-    return next((error for most, error, _ in GRADES if share <= most), EXTRAPOLATION_ERROR)
+    return next((error for most, error, _ in ERROR_GRADES if share <= most), EXTRAPOLATION_ERROR)

@@ -6,7 +6,8 @@ roads and speeds, a road's in path), and divisions by differences of eigenvalues
 sum over pairs, -Q_mn / (s_m + s_n*).
 
 Digits are lost where eigenvectors are nearly parallel, where two eigenvalues of different blocks nearly meet and
-where terms of a sum cancel. ``relative_error`` estimates how many; beyond LOSS the direct way is taken instead.
+where terms of a sum cancel. ``relative_error`` estimates how many; beyond LARGEST_FAST_ERROR the direct way is taken
+instead.
 """
 
 from collections import Counter
@@ -17,14 +18,14 @@ import numpy as np
 from scipy.linalg import matrix_balance
 from scipy.sparse.csgraph import connected_components
 
-from models.ride.covariance import FINITE, hits, silence, stationary, verdicts
-from models.ride.excited import DelayedSystem, excited
-from models.ride.marginal import ACCURACY, Growth, Unstable
-from models.ride.weighting import weighted
+from models.ride.covariance import FINITE, noise_arrivals, rounding_thresholds, stationary_covariance, variance_verdicts
+from models.ride.excited import DelayedSystem, vehicle_with_road
+from models.ride.marginal import MATRIX_ACCURACY, Growth, Unstable
+from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
-LOSS = 1e-9
+LARGEST_FAST_ERROR = 1e-9
 """Largest relative error that the fast route may suspect of itself; it overstates it ten to a thousand times."""
 
 
@@ -33,7 +34,7 @@ class Sweep:
     """Stationary variances. variance (cases, speeds, outputs), inf where infinite, with status and reason for each;
     units (outputs,).
 
-    ``direct``: number of points computed by the direct method, by the reason for not using the fast one.
+    ``direct_counts``: number of points computed by the direct method, by the reason for not using the fast one.
     """
 
     cases: tuple[str, ...]
@@ -43,7 +44,7 @@ class Sweep:
     variance: np.ndarray
     status: np.ndarray
     reason: np.ndarray
-    direct: Mapping[str, int]
+    direct_counts: Mapping[str, int]
 
     @property
     def deviation(self) -> np.ndarray:
@@ -55,12 +56,12 @@ class Sweep:
         return self.deviation[self.cases.index(case), :, self.outputs.index(output)]
 
 
-def sweep(
+def variance_sweep(
     vehicle: Callable[[float], LinearVehicle],
     excitations: Mapping[str, Excitation],
     speeds: Sequence[float] | np.ndarray,
     filters: Mapping[str, str] | None = None,
-    accuracy: float = ACCURACY,
+    accuracy: float = MATRIX_ACCURACY,
     fast: bool = True,
 ) -> Sweep:
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
@@ -68,17 +69,17 @@ def sweep(
     filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
     Raises Unstable.
     """
-    shared, direct, points = Shared(), Counter[str](), []
+    shared, direct, points = SharedModes(), Counter[str](), []
     for speed in speeds:
         linear = vehicle(speed)
         for excitation in excitations.values():
-            plain = excited(linear, excitation, speed)
-            system = weighted(plain, filters or {})
+            plain = vehicle_with_road(linear, excitation, speed)
+            system = system_with_weightings(plain, filters or {})
             states = len(plain.A) - len(plain.B) * len(excitation.F)
             point = _fast_variances(system, states, excitation, speed, shared, accuracy) if fast else ASKED_FOR
             if isinstance(point, str):
                 direct[point] += 1
-                point = _direct(system, speed, accuracy)
+                point = _direct_variances(system, speed, accuracy)
             points.append(point)
     shape = (len(speeds), len(excitations), -1)
     variance, status, reason = (
@@ -94,26 +95,28 @@ Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
 """Variance, status and reason of every output."""
 
 
-def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
+def _direct_variances(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
     """Variances from solving for the covariance; the error for an unstable vehicle states its speed."""
     try:
-        exact = stationary(system, accuracy)
+        exact = stationary_covariance(system, accuracy)
     except Unstable as error:
         raise Unstable(error.growth, error.frequency, speed) from None
     return exact.variance, exact.status, exact.reason
 
 
 def _fast_variances(
-    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
+    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "SharedModes", accuracy: float
 ) -> Answer | str:
     """Variances by the fast method, or a text that says why it is unreliable here."""
-    quick = modal(system, states, excitation.F, speed, shared)
+    quick = modal_variances(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
     none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
-    status, reason = verdicts(hits(system).D, quick.variance, quick.floor, none, quick.fastest, accuracy)
+    status, reason = variance_verdicts(
+        noise_arrivals(system).D, quick.variance, quick.rounding_floor, none, quick.fastest_rate, accuracy
+    )
     finite = np.array(status) == FINITE
-    if (quick.relative_error[finite] > LOSS).any():
+    if (quick.relative_error[finite] > LARGEST_FAST_ERROR).any():
         return "terms cancel"
     return np.where(finite, quick.variance, np.inf), status, reason
 
@@ -129,7 +132,7 @@ class Modes:
     condition: float
 
     @property
-    def blurred(self) -> float:
+    def rate_rounding(self) -> float:
         """Relative rounding error of the slowest decay rate: that of the fastest motion, times the condition number."""
         return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
 
@@ -152,11 +155,11 @@ def modes(A: np.ndarray) -> Modes:
 
 
 EPS = float(np.finfo(float).eps)
-BLURRED = 1e-11
+LARGEST_RATE_ROUNDING = 1e-11
 """Largest relative rounding of the slowest decay with which the sums are still made."""
 
 
-class Shared:
+class SharedModes:
     """Cache of eigen-decompositions, so that roads and speeds with the same block share its modes."""
 
     def __init__(self) -> None:
@@ -170,20 +173,22 @@ class Shared:
 
 
 @dataclass(frozen=True)
-class Modal:
-    """Results per output (p,): variance, ``floor`` that rounding makes of a zero variance, and bound
+class ModalVariances:
+    """Results per output (p,): variance, ``rounding_floor`` that rounding makes of a zero variance, and bound
     ``relative_error``.
 
-    fastest : rate of the system in 1/s
+    fastest_rate : rate of the system in 1/s
     """
 
     variance: np.ndarray
-    floor: np.ndarray
+    rounding_floor: np.ndarray
     relative_error: np.ndarray
-    fastest: float
+    fastest_rate: float
 
 
-def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: Shared) -> Modal | str:
+def modal_variances(
+    system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: SharedModes
+) -> ModalVariances | str:
     """Variances of a system as built by ``excited`` and ``weighted``, or a text that says why they cannot be computed
     here.
 
@@ -201,7 +206,7 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
     values = [vehicle_modes.values, np.tile(speed * path.values, axles), behind.values]
     if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
         return "a motion does not die out"
-    if max(each.blurred for each in (vehicle_modes, path, behind)) > BLURRED:
+    if max(each.rate_rounding for each in (vehicle_modes, path, behind)) > LARGEST_RATE_ROUNDING:
         return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -210,7 +215,7 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
         heard = _coupling_solution(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
     C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
     C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
-    arrivals, inputs = hits(system), []
+    arrivals, inputs = noise_arrivals(system), []
     for b in arrivals.B:
         of_road = back @ b[vehicle:last]
         of_vehicle = vehicle_modes.inverse @ (b[:vehicle] - met @ of_road)
@@ -227,7 +232,7 @@ def _coupling_solution(block: Modes, coupling: np.ndarray, values: np.ndarray) -
 
 def _variance_sum(
     s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
-) -> Modal | str:
+) -> ModalVariances | str:
     """Variances of y = C x for modes x_m' = s_m x_m + noise through the inputs, summed over the hits."""
     before = np.zeros_like(inputs[0])
     Q = np.zeros((len(s), len(s)), complex)
@@ -240,6 +245,6 @@ def _variance_sum(
     size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)
     if not np.isfinite(size).all():
         return "two eigenvalues of vehicle, road and weighting meet"
-    floor = silence(C, P)
+    floor = rounding_thresholds(C, P)
     relative_error = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
-    return Modal(variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(s).max()))
+    return ModalVariances(variance.clip(0.0), floor, np.where(size > floor, relative_error, 0.0), float(abs(s).max()))

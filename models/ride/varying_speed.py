@@ -21,17 +21,17 @@ import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from models.core.errors import InputError
-from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
-from models.ride.marginal import ACCURACY
+from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
+from models.ride.marginal import MATRIX_ACCURACY
 from models.ride.road_in_path import Responses, RoadInPath, at_speed, road_in_path
-from models.ride.speed_profile import SpeedProfile, nodes, steps
-from models.ride.sweep import sweep
+from models.ride.speed_profile import SpeedProfile, integration_points, steps
+from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_RATE_TIMES_STEP = 1.0
 """Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""
-BLOCK = 128
+STEPS_PER_BLOCK = 128
 """Steps whose responses are made at once."""
 
 
@@ -71,7 +71,7 @@ def varying_speed(
     *,
     weightings: Mapping[str, str] | None = None,
     instants: Sequence[float] | np.ndarray = (),
-    accuracy: float = ACCURACY,
+    accuracy: float = MATRIX_ACCURACY,
     reach: float = LARGEST_RATE_TIMES_STEP,
 ) -> VaryingSpeed:
     """Standard deviations along a drive that begins in the stationary state of its first speed, or at rest.
@@ -95,15 +95,15 @@ def varying_speed(
     if fastest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 somewhere: at standstill nothing moves")
     form = road_in_path(vehicle, excitation, weightings)
-    status = stationary(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
+    status = stationary_covariance(at_speed(vehicle, excitation, fastest, weightings), accuracy).status
     if first == 0.0:
         P = _standing_covariance(form)
     else:
-        P = stationary(at_speed(vehicle, excitation, first, weightings), accuracy).P
+        P = stationary_covariance(at_speed(vehicle, excitation, first, weightings), accuracy).P
         P = np.linalg.solve(form.basis, np.linalg.solve(form.basis, P).T)
     seen = [_all_variances(form, P, first, status)]
     time = [profile.times[0]]
-    moments = _moments(form, profile, P, instants, reach)
+    moments = _covariance_by_step(form, profile, P, instants, reach)
     for end, P in moments:
         time.append(end)
         seen.append(_all_variances(form, P, float(profile.speed(np.array(end))), status))
@@ -120,7 +120,7 @@ def quasi_stationary(
     speeds: np.ndarray,
     *,
     weightings: Mapping[str, str] | None = None,
-    accuracy: float = ACCURACY,
+    accuracy: float = MATRIX_ACCURACY,
 ) -> np.ndarray:
     """Standard deviations (N, p) as if each of the speeds (N,) had been constant for ever; for speed 0, those of a
     vehicle at rest.
@@ -132,7 +132,7 @@ def quasi_stationary(
     moving = different > 0.0
     deviations = np.empty((len(different), len(form.names)))
     if moving.any():
-        over = sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
+        over = variance_sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
         deviations[moving] = over.deviation[0]
     if not moving.all():
         deviations[~moving] = np.sqrt(
@@ -141,7 +141,7 @@ def quasi_stationary(
     return deviations[which]
 
 
-def _moments(
+def _covariance_by_step(
     road_in_path: RoadInPath, profile: SpeedProfile, P: np.ndarray, instants: Sequence[float] | np.ndarray, reach: float
 ) -> Iterator[tuple[float, np.ndarray]]:
     """End of each step of the drive and the covariance there, starting from P.
@@ -154,9 +154,9 @@ def _moments(
     lead = max(apart, default=0.0) / first if first else 0.0
     motion, path = (float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (road_in_path.A, road.F))
     ends = steps(profile, profile.times[0] - lead, instants, motion, path, reach)
-    points = nodes(profile, ends, sorted({distance for distance in apart if distance}))
+    points = integration_points(profile, ends, sorted({distance for distance in apart if distance}))
     responses = Responses(road_in_path, profile)
-    hits = [_Met(responses, axle, points.time, ends) for axle in range(len(road.heights))]
+    hits = [_NoiseMet(responses, axle, points.time, ends) for axle in range(len(road.heights))]
     queues = [_Queue(responses, i, j, points.time, ends) for i, j in pairs]
     for step, (start, end) in enumerate(pairwise(ends)):
         E = responses.transition(start, end)
@@ -164,14 +164,14 @@ def _moments(
             queue.move(E, step)
         if end > profile.times[0]:
             b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].within(step)]
-            half = [_product(block, block, weight) / 2.0 for block in b]
-            half += [_product(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
+            half = [_sum_of_products(block, block, weight) / 2.0 for block in b]
+            half += [_sum_of_products(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
             Q = np.sum(half, axis=0)
             P = E @ P @ E.T + Q + Q.T
             yield end, P
 
 
-class _Met:
+class _NoiseMet:
     """State responses at the ends of the steps to noise that an axle meets at given times (s) in ascending order."""
 
     def __init__(self, responses: Responses, axle: int, time: np.ndarray, step_ends: np.ndarray) -> None:
@@ -185,12 +185,15 @@ class _Met:
 
     def of(self, step: int) -> np.ndarray:
         """Responses (n, c, k) to the noise met in a step."""
-        block = step // BLOCK
-        last = min((block + 1) * BLOCK, len(self.ends) - 1)
-        begin = self.first[block * BLOCK]
+        block = step // STEPS_PER_BLOCK
+        last = min((block + 1) * STEPS_PER_BLOCK, len(self.ends) - 1)
+        begin = self.first[block * STEPS_PER_BLOCK]
         if block != self.block:
             time = self.time[begin : self.first[last]]
-            end = np.repeat(self.ends[block * BLOCK + 1 : last + 1], np.diff(self.first[block * BLOCK : last + 1]))
+            end = np.repeat(
+                self.ends[block * STEPS_PER_BLOCK + 1 : last + 1],
+                np.diff(self.first[block * STEPS_PER_BLOCK : last + 1]),
+            )
             self.made, self.block = self.responses.to_noise(self.axle, time, end), block
         return self.made[:, self.first[step] - begin : self.first[step + 1] - begin]
 
@@ -205,7 +208,7 @@ class _Queue:
         met = profile.time(place) if distance else time
         before = np.isneginf(met)
         self.waiting = _delayed_responses(form, axle, -place[before])
-        self.met = _Met(responses, axle, met[~before], step_ends)
+        self.met = _NoiseMet(responses, axle, met[~before], step_ends)
 
     def move(self, E: np.ndarray, step: int) -> None:
         """Advance all responses by one step, and add those to noise that is met within the step."""
@@ -219,7 +222,7 @@ class _Queue:
         return taken
 
 
-def _product(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _sum_of_products(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Sum over points and channels of the products of two responses, both (n, c, k), weighted with the points' weights
     (c,)."""
     n = len(first)
@@ -231,7 +234,7 @@ def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) 
     position."""
     F, G = road_in_path.excitation.F, road_in_path.excitation.G
     road = np.array([expm(F * distance) @ G for distance in behind]).reshape(-1, *G.shape)
-    n, axles, m = road_in_path.inputs.shape
+    n, axles, m = road_in_path.noise_inputs.shape
     if not len(behind):
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
     after = np.zeros((axles * m, len(behind), G.shape[1]))
@@ -249,7 +252,7 @@ def _state_at_rest(road_in_path: RoadInPath) -> np.ndarray:
             "must be above 0: this vehicle has a motion that nothing pulls "
             "back, so it knows no state of rest to begin in",
         )
-    inputs = road_in_path.inputs.reshape(len(road_in_path.A), -1)
+    inputs = road_in_path.noise_inputs.reshape(len(road_in_path.A), -1)
     return np.vstack([-np.linalg.solve(road_in_path.A, inputs), np.eye(inputs.shape[1])])
 
 

@@ -63,7 +63,7 @@ class Weighting:
         return A, B, before
 
 
-def weighting(
+def weighting_of_standard(
     name: str, transition: tuple[float, float, float] | None, step: tuple[float, float, float, float] | None = None
 ) -> Weighting:
     """Weighting from parameters of the standard: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
@@ -81,19 +81,19 @@ def weighting(
 
 
 WEIGHTINGS = {
-    "Wk": weighting("Wk", (12.5, 12.5, 0.63), (2.37, 0.91, 3.35, 0.91)),
-    "Wd": weighting("Wd", (2.0, 2.0, 0.63)),
-    "Wc": weighting("Wc", (8.0, 8.0, 0.63)),
-    "We": weighting("We", (1.0, 1.0, 0.63)),
-    "Wj": weighting("Wj", None, (3.75, 0.91, 5.32, 0.91)),
+    "Wk": weighting_of_standard("Wk", (12.5, 12.5, 0.63), (2.37, 0.91, 3.35, 0.91)),
+    "Wd": weighting_of_standard("Wd", (2.0, 2.0, 0.63)),
+    "Wc": weighting_of_standard("Wc", (8.0, 8.0, 0.63)),
+    "We": weighting_of_standard("We", (1.0, 1.0, 0.63)),
+    "Wj": weighting_of_standard("Wj", None, (3.75, 0.91, 5.32, 0.91)),
 }
 """Wk: vertical, seat and floor; Wd: fore and aft, sideways; Wc: backrest; We: rotations; Wj: under the head."""
 
-HEALTH = {"x": 1.4, "y": 1.4, "z": 1.0}
+HEALTH_FACTORS = {"x": 1.4, "y": 1.4, "z": 1.0}
 """Factors of the axes on the seat for health (Wd, Wd, Wk); for comfort all are 1."""
 
 
-def weighted(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem:
+def system_with_weightings(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem:
     """The system with weighted outputs after its own: {"seat_z": "Wk"} adds the output "seat_z Wk".
 
     Filter states stand after the system's. A weighted output is finite even where white noise reaches the output
@@ -110,8 +110,8 @@ def weighted(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem
     sections = [WEIGHTINGS[name].matrices() for name in filters.values()]
     A, inputs, C = (
         block_diag(*(a for a, _, _ in sections)),
-        _columns([b for _, b, _ in sections]),
-        _columns([c for *_, c in sections]),
+        _block_columns([b for _, b, _ in sections]),
+        _block_columns([c for *_, c in sections]),
     )
     n, p = len(system.A), len(filters)
     corner, silent = np.zeros((n, len(A))), np.zeros((p, system.B[0].shape[1]))
@@ -131,6 +131,6 @@ def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]
     return math.sqrt(sum((factors[axis] * value) ** 2 for axis, value in accelerations.items()))
 
 
-def _columns(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _block_columns(parts: Sequence[np.ndarray]) -> np.ndarray:
     """Block-diagonal matrix in which each given vector is one column."""
     return block_diag(*(part[:, None] for part in parts))

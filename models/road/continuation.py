@@ -20,14 +20,14 @@ import numpy as np
 from models.core.errors import InputError
 from models.road.profile import OVERRUN_SHARE, RoadProfile, SplineProfile
 
-RULES = ("mirrored", "refused")
+CONTINUATION_RULES = ("mirrored", "refused")
 RUN_IN = 5.0
 """Default length of the run-in, m."""
 MOST_POINTS = 5_000_000
 """Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
 
 
-def continued(profile: RoadProfile, rule: str, needed: float, file: object = "") -> RoadProfile:
+def continued_road(profile: RoadProfile, rule: str, needed: float, file: object = "") -> RoadProfile:
     """Road that reaches at least to ``needed``, or an error; a road that is long enough comes back as it is.
 
     Parameters
@@ -41,8 +41,8 @@ def continued(profile: RoadProfile, rule: str, needed: float, file: object = "")
     ------
     InputError : unknown rule; the road is too short and the rule is "refused"
     """
-    if rule not in RULES:
-        raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", RULES)
+    if rule not in CONTINUATION_RULES:
+        raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", CONTINUATION_RULES)
     if not math.isfinite(needed):
         raise InputError(file, "distance", needed, "must be a finite distance in m")
     if not isinstance(profile, SplineProfile) or needed <= profile.end + OVERRUN_SHARE * (profile.end - profile.start):

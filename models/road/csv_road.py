@@ -17,9 +17,9 @@ from models.core.errors import InputError
 from models.core.tables import DISTANCES, METRES, read_table
 from models.road.profile import SplineProfile
 
-TRACKS = ("left", "right", "mean")
+TRACK_NAMES = ("left", "right", "mean")
 
-_COLUMNS = {"s": DISTANCES, "left": METRES, "right": METRES}
+_ROAD_COLUMNS = {"s": DISTANCES, "left": METRES, "right": METRES}
 
 
 def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
@@ -38,8 +38,8 @@ def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
     ------
     InputError : naming file, line, value and what is allowed; fewer than 4 points are no road
     """
-    if track not in TRACKS:
-        raise InputError(path, "track", track, "must be a track of the file", TRACKS)
+    if track not in TRACK_NAMES:
+        raise InputError(path, "track", track, "must be a track of the file", TRACK_NAMES)
     left, right = read_csv_tracks(path)
     mean = SplineProfile.through(left.station, (left.points[1] + right.points[1]) / 2.0, f"{Path(path).name}, mean")
     return {"left": left, "right": right, "mean": mean}[track]
@@ -47,11 +47,13 @@ def read_csv_road(path: str | Path, track: str = "mean") -> SplineProfile:
 
 def read_csv_tracks(path: str | Path) -> tuple[SplineProfile, SplineProfile]:
     """Left and right track of a CSV file; file, frame and errors as in :func:`read_csv_road`."""
-    table = read_table(path, _COLUMNS, increasing="s", least=4)
+    table = read_table(path, _ROAD_COLUMNS, increasing="s", least=4)
     station = table["s"] - table["s"][0]
     name = Path(path).name
-    return _track(station, table["left"], f"{name}, left"), _track(station, table["right"], f"{name}, right")
+    return _track_profile(station, table["left"], f"{name}, left"), _track_profile(
+        station, table["right"], f"{name}, right"
+    )
 
 
-def _track(station: np.ndarray, up: np.ndarray, name: str) -> SplineProfile:
+def _track_profile(station: np.ndarray, up: np.ndarray, name: str) -> SplineProfile:
     return SplineProfile.through(station, -up, name)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.core.errors import InputError
-from models.road.measured_tracks import MeasuredTracks, TrackSpectra, spectra
+from models.road.measured_tracks import MeasuredTracks, TrackSpectra, track_spectra
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad
 
 PER_DECADE = 10
 """Bands per decade in which a density is averaged before the fit, so that every octave counts the same."""
-HIGHEST = 2.0 * math.pi * 2.83
+HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
 """Upper end of the standard's band, rad/m: shorter waves are the tyre's business."""
 
 
@@ -21,18 +21,18 @@ HIGHEST = 2.0 * math.pi * 2.83
 class FilterFit:
     """First-order filter fitted to a density between ``low`` and ``high`` (rad/m).
 
-    corner_error, intensity_error: relative standard errors from the scatter about the fit. ``residual``: rms of
-    ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``resolved`` if it lies within the
-    band and is known to half of itself; it is never sought below a tenth of ``low``.
+    corner_error, intensity_error: relative standard errors from the scatter about the fit. ``log_residual``: rms of
+    ln(measured / fitted) over the bands; 0.69 is a factor of two. The corner is ``corner_is_resolved`` if it lies
+    within the band and is known to half of itself; it is never sought below a tenth of ``low``.
     """
 
     filter: ShapeFilter
     corner_error: float
     intensity_error: float
-    residual: float
+    log_residual: float
     low: float
     high: float
-    resolved: bool
+    corner_is_resolved: bool
 
 
 @dataclass(frozen=True)
@@ -59,22 +59,24 @@ def fit_road(
     ------
     InputError : too few windows, fewer than four bands to fit two numbers to, or no mean process at all
     """
-    measured = spectra(tracks, window_length)
+    measured = track_spectra(tracks, window_length)
     height = max(float(np.abs(tracks.left).max()), float(np.abs(tracks.right).max()))
     if float(np.ptp(tracks.left + tracks.right)) <= 1e-12 * height:
         raise InputError(tracks.name, "heights", None, "left and right have the same mean all along: there is no road")
     least = 2.0 * float(measured.wavenumber[0]) if low is None else low
-    most = min(HIGHEST, 0.5 * float(measured.wavenumber[-1])) if high is None else high
-    mean = _fit_first_order(measured.wavenumber, measured.mean, measured.freedom, least, most, tracks.name)
+    most = min(HIGHEST_WAVENUMBER, 0.5 * float(measured.wavenumber[-1])) if high is None else high
+    mean = _fit_first_order(measured.wavenumber, measured.mean, measured.degrees_of_freedom, least, most, tracks.name)
     apart = float(np.abs(tracks.left - tracks.right).max())
     roll = (
-        _fit_first_order(measured.wavenumber, measured.roll, measured.freedom, least, most, tracks.name)
+        _fit_first_order(measured.wavenumber, measured.roll, measured.degrees_of_freedom, least, most, tracks.name)
         if apart > 0.0
         else None
     )
     silent = ShapeFilter(mean.filter.corner, 0.0)
     road = TwoTrackRoad(mean.filter, silent if roll is None else roll.filter)
-    return FittedRoad(road, mean, roll, (*_limits(tracks, measured), *_doubts(measured, mean, roll)), measured)
+    return FittedRoad(
+        road, mean, roll, (*_data_limit_sentences(tracks, measured), *_misfit_sentences(measured, mean, roll)), measured
+    )
 
 
 def _fit_first_order(
@@ -84,7 +86,7 @@ def _fit_first_order(
     unknowns."""
     from scipy.optimize import least_squares
 
-    middle, mean = _bands(k, density, freedom, low, high)
+    middle, mean = _band_averages(k, density, freedom, low, high)
     if len(middle) < 4:
         allowed = f"four bands or more are needed between {low:.3g} and {high:.3g} rad/m: the road is too short"
         raise InputError(name, "bands to fit", len(middle), allowed)
@@ -104,7 +106,7 @@ def _fit_first_order(
     return FilterFit(filter, float(sd[0]), float(sd[1]), residual, low, high, resolved)
 
 
-def _bands(
+def _band_averages(
     k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Band centres (rad/m), and logarithms of the densities times k^2 averaged in bands, corrected for the bias of the
@@ -125,10 +127,10 @@ def _bands(
     return np.array(middles), np.array(values)
 
 
-def _limits(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
+def _data_limit_sentences(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
     """Sentences on limits of the data that no fit can remove."""
     least = spectra.wavenumber[0]
-    low, high = spectra.band()
+    low, high = spectra.confidence_factors()
     return [
         f"{tracks.length:g} m in {spectra.windows} windows: nothing is known of waves longer than "
         f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
@@ -137,7 +139,7 @@ def _limits(tracks: MeasuredTracks, spectra: TrackSpectra) -> list[str]:
     ]
 
 
-def _doubts(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
+def _misfit_sentences(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
     """Sentences on where the fitted road differs from the measured one."""
     said = []
     for name, fitted in (("mean", mean), ("roll", roll)):
@@ -146,14 +148,15 @@ def _doubts(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> l
                 "left and right are the same heights: there is no roll process, and the file says nothing of it"
             )
             continue
-        if not fitted.resolved:
+        if not fitted.corner_is_resolved:
             said.append(
                 f"the corner of the {name} process is not told by this road: only its level above "
                 f"{fitted.low:.3g} rad/m is; do not read its variance"
             )
-        if fitted.residual > math.log(2.0):
+        if fitted.log_residual > math.log(2.0):
             said.append(
-                f"the {name} process is not of first order: the fit is off by a factor {_factor(fitted):.1f} (rms)"
+                f"the {name} process is not of first order: the fit is off by a factor "
+                f"{_scatter_factor(fitted):.1f} (rms)"
             )
     shared = np.abs(spectra.mean_roll) / np.sqrt(spectra.mean * np.maximum(spectra.roll, 1e-300))
     used = (spectra.wavenumber >= mean.low) & (spectra.wavenumber <= mean.high)
@@ -166,5 +169,5 @@ def _doubts(spectra: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> l
     return said
 
 
-def _factor(fitted: FilterFit) -> float:
-    return math.exp(fitted.residual)
+def _scatter_factor(fitted: FilterFit) -> float:
+    return math.exp(fitted.log_residual)

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models.road.profile import RoadProfile, Samples
+from models.road.profile import HeightsAndSlopes, RoadProfile
 
-TRANSITION = 40.0
+TRANSITION_LENGTH = 40.0
 """Length (m) over which the slope grows from 0 to its full value."""
 
 
 @dataclass(frozen=True, eq=False)
 class Graded:
-    """A profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION W((s - start) / TRANSITION).
+    """A profile on a grade: zeta(s) = profile(s) - tan(grade) TRANSITION_LENGTH W((s - start) / TRANSITION_LENGTH).
 
     W is the integral of the quintic smoothstep: 0 before 0, x^6 - 3 x^5 + 5/2 x^4 up to 1, x - 1/2 beyond. So
     the slope grows monotonically and without a jump up to its second derivative, and beyond the transition the
-    grade adds exactly -tan(grade) (s - start - TRANSITION / 2) to the height.
+    grade adds exactly -tan(grade) (s - start - TRANSITION_LENGTH / 2) to the height.
 
     Parameters
     ----------
@@ -44,29 +44,29 @@ class Graded:
     @property
     def finest(self) -> float:
         """Length (m) of the finest detail: the profile's, or a quarter of the transition."""
-        return min(self.profile.finest, TRANSITION / 4.0)
+        return min(self.profile.finest, TRANSITION_LENGTH / 4.0)
 
-    def height_and_slope(self, s: ArrayLike) -> Samples:
+    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         height, slope = self.profile.height_and_slope(s)
-        more = self._climb(np.asarray(s, dtype=float))
+        more = self._climb_and_slope(np.asarray(s, dtype=float))
         return height + more[0], slope + more[1]
 
-    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
         height, slope = self.profile.sample_uniform(start, step, count)
-        more = self._climb(start + step * np.arange(count))
+        more = self._climb_and_slope(start + step * np.arange(count))
         return height + more[0], slope + more[1]
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
         height, slope = self.profile.height_slope_at(s)
-        more = self._climb(np.asarray(s, dtype=float))
+        more = self._climb_and_slope(np.asarray(s, dtype=float))
         return height + float(more[0]), slope + float(more[1])
 
-    def _climb(self, s: np.ndarray) -> Samples:
+    def _climb_and_slope(self, s: np.ndarray) -> HeightsAndSlopes:
         """Heights (m) and slopes that the grade adds at stations ``s``."""
-        beyond = (s - self.start) / TRANSITION
+        beyond = (s - self.start) / TRANSITION_LENGTH
         x, steepness = np.clip(beyond, 0.0, 1.0), math.tan(self.grade)
         risen = x**4 * (2.5 - x * (3.0 - x)) + np.maximum(beyond - 1.0, 0.0)
-        return -steepness * TRANSITION * risen, -steepness * x**3 * (10.0 - x * (15.0 - 6.0 * x))
+        return -steepness * TRANSITION_LENGTH * risen, -steepness * x**3 * (10.0 - x * (15.0 - 6.0 * x))

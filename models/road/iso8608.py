@@ -16,10 +16,10 @@ from models.core.errors import InputError
 if TYPE_CHECKING:
     from models.road.profile import SineProfile
 
-CLASSES = {name: 16e-6 * 4.0**i for i, name in enumerate("ABCDEFGH")}
+DENSITY_OF_CLASS = {name: 16e-6 * 4.0**i for i, name in enumerate("ABCDEFGH")}
 """Geometric mean of Gd(0.1 waves per metre), m^3, one-sided; the upper limit of a class is twice that."""
 
-SIDES = {"one-sided": 1.0, "two-sided": 2.0}
+FACTOR_TO_ONE_SIDED = {"one-sided": 1.0, "two-sided": 2.0}
 """Factor from a density as it was stated to the one-sided density of the same road."""
 
 
@@ -51,7 +51,9 @@ def iso8608_road(
     InputError : unknown class or level, a band, a seed or a number of waves that is not possible
     """
     _check_class(road_class, level)
-    road = rough_road(CLASSES[road_class] * SIDES[level], seed, n_min, n_max, waves, window_length)
+    road = rough_road(
+        DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level], seed, n_min, n_max, waves, window_length
+    )
     name = f"ISO 8608 class {road_class} ({level}), seed {seed}"
     from models.road.profile import SineProfile
 
@@ -66,7 +68,7 @@ def level_of_class(road_class: str, level: str = "one-sided") -> float:
     InputError for an unknown class or level.
     """
     _check_class(road_class, level)
-    return math.pi * 0.1**2 * CLASSES[road_class] * SIDES[level]
+    return math.pi * 0.1**2 * DENSITY_OF_CLASS[road_class] * FACTOR_TO_ONE_SIDED[level]
 
 
 def class_at_level(level: float) -> str:
@@ -75,7 +77,7 @@ def class_at_level(level: float) -> str:
     if level <= 0.0:
         return "smooth"
     place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes
-    name = list(CLASSES)[min(max(round(place), 0), len(CLASSES) - 1)]
+    name = list(DENSITY_OF_CLASS)[min(max(round(place), 0), len(DENSITY_OF_CLASS) - 1)]
     return f"{level / level_of_class(name):.2f} times the mean of ISO 8608 class {name}, one-sided"
 
 
@@ -85,9 +87,9 @@ def rough_road(
     """Road with the **one-sided** density gd (n / 0.1)^-2, gd in m^3; the rest as :func:`iso8608_road`."""
     _check_band(gd, seed, n_min, n_max, waves)
     from models.road.profile import SineProfile
-    from models.road.study import roughness
+    from models.road.study import road_waves
 
-    amplitude, wavenumber = roughness(gd, n_min, n_max, waves)
+    amplitude, wavenumber = road_waves(gd, n_min, n_max, waves)
     name = f"Gd = {gd:g} m^3 (one-sided), seed {seed}"
     return SineProfile(amplitude, wavenumber, random_phases(seed, waves), window_length, name)
 
@@ -104,10 +106,10 @@ def random_phases(seed: int, waves: int) -> np.ndarray:
 
 def _check_class(road_class: str, level: str) -> None:
     """Refuse a class or level convention that the standard does not know."""
-    if road_class not in CLASSES:
-        raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(CLASSES))
-    if level not in SIDES:
-        raise InputError("", "level", level, "must say how the density is to be read", tuple(SIDES))
+    if road_class not in DENSITY_OF_CLASS:
+        raise InputError("", "road class", road_class, "must be a class of ISO 8608", tuple(DENSITY_OF_CLASS))
+    if level not in FACTOR_TO_ONE_SIDED:
+        raise InputError("", "level", level, "must say how the density is to be read", tuple(FACTOR_TO_ONE_SIDED))
 
 
 def _check_band(gd: float, seed: int, n_min: float, n_max: float, waves: int) -> None:

@@ -17,7 +17,7 @@ One rotation adds at most about 2e-16 of a wave's amplitude; 128 of them stay ne
 rounding fell the same way, and the exact values then cost 1/128 of what direct evaluation costs.
 """
 
-LANES = 16
+VECTOR_LANES = 16
 """The waves are filled up with waves of amplitude 0 to a multiple of this, so that no vector is left over."""
 
 
@@ -41,7 +41,7 @@ def smoothstep(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def windowed(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
+def faded_in(distance: float, window: float, height: float, slope: float) -> tuple[float, float]:
     """Value and slope of ``w(distance / window) * height``; 0 for distances up to 0; a window of 0 means no
     windowing."""
     if distance <= 0.0:
@@ -62,18 +62,18 @@ def sines_at(s, amplitude, wavenumber, phase, window):
             angle = wavenumber[i] * s + phase[i]
             height -= amplitude[i] * math.sin(angle)
             slope -= amplitude[i] * wavenumber[i] * math.cos(angle)
-    return windowed(s, window, height, slope)
+    return faded_in(s, window, height, slope)
 
 
 @njit(cache=True)
-def sines(s, waves, height, slope):
+def fill_sines(s, waves, height, slope):
     """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
     for j in range(s.size):
         height[j], slope[j] = sines_at(s[j], waves.amplitude, waves.wavenumber, waves.phase, waves.window)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _rotate(sine, cosine, turn_sine, turn_cosine, wavenumber):
+def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
     """Sums of all waves and of their slopes at the present sample; then rotate every wave to the next sample.
 
     The waves are the inner loop because they are independent: the sums may be reordered (``reassoc``),
@@ -94,7 +94,7 @@ def sines_uniform(start, step, waves, height, slope):
     """Fill ``height`` and ``slope`` at ``start + j step`` by complex rotation, exact every 128 samples."""
     amplitude, wavenumber, phase, window = waves
     n = amplitude.size
-    work = np.zeros((5, (n + LANES - 1) // LANES * LANES))
+    work = np.zeros((5, (n + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES))
     sine, cosine, turn_sine, turn_cosine, number = work[0], work[1], work[2], work[3], work[4]
     for i in range(n):  # a slice assigned at once takes seconds to compile
         number[i] = wavenumber[i]
@@ -105,8 +105,8 @@ def sines_uniform(start, step, waves, height, slope):
             angle = number[i] * s + phase[i]
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
-            value, rate = _rotate(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = windowed(start + j * step, window, value, rate)
+            value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
+            height[j], slope[j] = faded_in(start + j * step, window, value, rate)
 
 
 @njit(cache=True)
@@ -135,7 +135,7 @@ def cubic_at(s, piece, station, coefficients, window):
     height = ((a * d + b) * d + c) * d + e
     slope = (3.0 * a * d + 2.0 * b) * d + c
     if window > 0.0:
-        return windowed(s - station[0], window, height, slope)
+        return faded_in(s - station[0], window, height, slope)
     return height, slope
 
 
@@ -146,7 +146,7 @@ def cubic_one(s, station, coefficients, window):
 
 
 @njit(cache=True)
-def cubics(s, station, coefficients, window, height, slope):
+def fill_cubics(s, station, coefficients, window, height, slope):
     """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
     piece = 0
     for j in range(s.size):

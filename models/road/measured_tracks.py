@@ -15,7 +15,7 @@ from models.core.errors import InputError
 from models.road.csv_road import read_csv_tracks
 from models.road.opencrg import TRACK_WIDTH, read_opencrg
 
-WINDOWS = 8
+WELCH_WINDOWS = 8
 """Windows that a road is cut into unless a window's length is given."""
 
 
@@ -40,7 +40,7 @@ class TrackSpectra:
     """Two-sided densities over ``wavenumber`` (rad/m, above 0): tracks, mean and roll process, cross densities.
 
     left, right, mean and the complex ``cross`` (left with right) in m^3, roll in m; ``mean_roll`` in m^2 is 0 for
-    the road of mean and roll process. ``freedom``: degrees of freedom of every density.
+    the road of mean and roll process. ``degrees_of_freedom``: degrees of freedom of every density.
     """
 
     wavenumber: np.ndarray
@@ -51,23 +51,23 @@ class TrackSpectra:
     roll: np.ndarray
     mean_roll: np.ndarray
     windows: int
-    freedom: float
+    degrees_of_freedom: float
 
     @property
     def coherency(self) -> np.ndarray:
         """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
-    def band(self, level: float = 0.95) -> tuple[float, float]:
+    def confidence_factors(self, level: float = 0.95) -> tuple[float, float]:
         """Factors by which to multiply a density to get its confidence interval at probability ``level``."""
         from scipy.stats import chi2
 
-        low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.freedom)
-        return self.freedom / high, self.freedom / low
+        low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.degrees_of_freedom)
+        return self.degrees_of_freedom / high, self.degrees_of_freedom / low
 
     def chance_coherency(self, level: float = 0.95) -> float:
         """Coherency that two unrelated tracks do not exceed by chance, with probability ``level``."""
-        independent = self.freedom / 2.0
+        independent = self.degrees_of_freedom / 2.0
         return math.sqrt(1.0 - (1.0 - level) ** (1.0 / (independent - 1.0)))
 
 
@@ -106,13 +106,13 @@ def read_tracks(
     return MeasuredTracks(up[0], up[1], step, track_width / 2.0, Path(path).name)
 
 
-def spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
+def track_spectra(tracks: MeasuredTracks, window_length: float | None = None) -> TrackSpectra:
     """Spectral densities by Welch's method; ``window_length`` in m, by default so that eight windows fit.
 
     Raises InputError for windows of fewer than 16 stations or fewer than two of them: no density at all.
     """
     count = len(tracks.left)
-    wanted = 2.0 * tracks.length / (WINDOWS + 1) if window_length is None else window_length
+    wanted = 2.0 * tracks.length / (WELCH_WINDOWS + 1) if window_length is None else window_length
     size = math.floor(wanted / tracks.increment + 1e-9)
     windows = (count - size // 2) // (size - size // 2) if size >= 16 else 0
     if windows < 2:

@@ -30,10 +30,10 @@ from models.road.profile import RoadProfile, SplineProfile
 SMALLEST_INCREMENT = 1e-3
 """Smallest distance of stations that the format's own checks accept, m."""
 
-_SIDES = {"left": (0.5,), "right": (-0.5,), "centre": (0.0,), "mean": (0.5, -0.5)}
-_WIDTHS = {"KRBI": 4, "KDBI": 8, "LRFI": 10, "LDFI": 20}
-_LINE = 80
-_KEYWORD = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
+_LATERAL_POSITIONS = {"left": (0.5,), "right": (-0.5,), "centre": (0.0,), "mean": (0.5, -0.5)}
+_BYTES_PER_VALUE = {"KRBI": 4, "KDBI": 8, "LRFI": 10, "LDFI": 20}
+_HEADER_LINE_LENGTH = 80
+_KEYWORD_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(\S+)")
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,10 @@ def read_opencrg(
     InputError : naming file, place, value and what is allowed, for every file that is damaged, cut off,
         inconsistent, has no height on the track, or scales itself by modifiers (apply them first)
     """
-    if track not in _SIDES:
-        raise InputError(path, "track", track, "must be a track", tuple(_SIDES))
+    if track not in _LATERAL_POSITIONS:
+        raise InputError(path, "track", track, "must be a track", tuple(_LATERAL_POSITIONS))
     road = _load(path)
-    lines = [_heights(path, road, offset + side * track_width) for side in _SIDES[track]]
+    lines = [_heights_at(path, road, offset + side * track_width) for side in _LATERAL_POSITIONS[track]]
     up = lines[0] if len(lines) == 1 else 0.5 * (lines[0] + lines[1])
     if up.size < 4:
         raise InputError(path, "cross sections", up.size, "at least 4 are needed")
@@ -103,7 +103,7 @@ def write_opencrg(
     ------
     InputError : lengths that are not possible, a road too short, a file that cannot be written
     """
-    count = _stations(path, length, increment)
+    count = _count_of_stations(path, length, increment)
     tracks = [right if right is not None else profile, profile]  # the format goes from right to left
     s = np.arange(count) * increment
     up = np.column_stack([-track.height_and_slope(s)[0] for track in tracks])
@@ -115,7 +115,7 @@ def write_opencrg(
         raise InputError(path, "", None, f"the file cannot be written: {error}") from None
 
 
-def _stations(path: str | Path, length: float, increment: float) -> int:
+def _count_of_stations(path: str | Path, length: float, increment: float) -> int:
     """Number of stations of a road to be written."""
     if not (math.isfinite(increment) and increment >= SMALLEST_INCREMENT):
         raise InputError(path, "increment (m)", increment, f"must be {SMALLEST_INCREMENT} or more")
@@ -133,7 +133,7 @@ def _load(path: str | Path) -> Any:
             warnings.simplefilter("ignore")  # looked at below, where they can be told apart
             road = pyopencrg.read(path)
     except Exception as error:
-        raise _unreadable(path, error) from None
+        raise _unreadable_file_error(path, error) from None
     if road.read_warnings:
         raise InputError(path, "data", None, road.read_warnings[0])
     if road.nu != promise.records:
@@ -145,7 +145,7 @@ def _load(path: str | Path) -> Any:
     return road
 
 
-def _unreadable(path: str | Path, error: Exception) -> InputError:
+def _unreadable_file_error(path: str | Path, error: Exception) -> InputError:
     """InputError from any exception of the library, which damaged bytes may raise in almost any form."""
     reason = str(error).replace(f"{path}: ", "").split("\nTo open it anyway")[0]
     return InputError(path, "", None, f"not a readable OpenCRG file: {reason or type(error).__name__}")
@@ -158,36 +158,38 @@ def _check_header(path: str | Path) -> _Promise:
         data = Path(path).read_bytes()[header.data_offset :]
         marked = b"#:" in Path(path).read_bytes()[: header.data_offset]
     except Exception as error:
-        raise _unreadable(path, error) from None
-    if not header.kd_def or not marked or header.fmt not in _WIDTHS:
-        formats = ", ".join(_WIDTHS)
+        raise _unreadable_file_error(path, error) from None
+    if not header.kd_def or not marked or header.fmt not in _BYTES_PER_VALUE:
+        formats = ", ".join(_BYTES_PER_VALUE)
         raise InputError(path, "$KD_DEFINITION", None, f"the data channels and one of the formats {formats} are needed")
     text = header.fmt.startswith("L")
-    promise = _Promise(_records(path, header), len(header.kd_def), _WIDTHS[header.fmt], text, header.data_offset)
+    promise = _Promise(
+        _count_of_records(path, header), len(header.kd_def), _BYTES_PER_VALUE[header.fmt], text, header.data_offset
+    )
     (_check_text if text else _check_binary)(path, promise, data)
     return promise
 
 
-def _records(path: str | Path, header: IplData) -> int:
+def _count_of_records(path: str | Path, header: IplData) -> int:
     """Number of cross sections between the first and the last u of the header."""
     if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
         raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
     block, _ = cut_block(header.struct, "ROAD_CRG")
-    matches = [_KEYWORD.match(line.lower()) for line in block or []]
+    matches = [_KEYWORD_PATTERN.match(line.lower()) for line in block or []]
     values = {match[1]: match[2] for match in matches if match}
-    start = _value(path, values, "reference_line_start_u", "0")
-    end = _value(path, values, "reference_line_end_u")
-    increment = _value(path, values, "reference_line_increment")
+    start = _header_number(path, values, "reference_line_start_u", "0")
+    end = _header_number(path, values, "reference_line_end_u")
+    increment = _header_number(path, values, "reference_line_increment")
     if increment < SMALLEST_INCREMENT:
         raise InputError(path, "reference_line_increment", increment, f"must be {SMALLEST_INCREMENT} m or more")
-    if _value(path, values, "long_section_v_increment", "1") <= 0.0:
+    if _header_number(path, values, "long_section_v_increment", "1") <= 0.0:
         raise InputError(path, "long_section_v_increment", values["long_section_v_increment"], "must be above 0")
     if end <= start:
         raise InputError(path, "reference_line_end_u", end, f"must be greater than the start, {start:g}")
     return round((end - start) / increment) + 1
 
 
-def _value(path: str | Path, values: dict[str, str], key: str, default: str = "") -> float:
+def _header_number(path: str | Path, values: dict[str, str], key: str, default: str = "") -> float:
     """One number from the header. Length and increment must be there, since without them missing data go unnoticed."""
     text = values.get(key, default)
     try:
@@ -201,7 +203,7 @@ def _value(path: str | Path, values: dict[str, str], key: str, default: str = ""
 
 def _check_binary(path: str | Path, promise: _Promise, data: bytes) -> None:
     """Check that binary data are records without gaps, padded to a multiple of 80 bytes."""
-    wanted = math.ceil(promise.records * promise.channels * promise.width / _LINE) * _LINE
+    wanted = math.ceil(promise.records * promise.channels * promise.width / _HEADER_LINE_LENGTH) * _HEADER_LINE_LENGTH
     if len(data) != wanted:
         what = f"{promise.records} cross sections of {promise.channels} values need {wanted} bytes"
         raise InputError(path, f"data from byte {promise.offset}", len(data), f"{what}: the file is cut off or damaged")
@@ -211,7 +213,7 @@ def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
     """Check that text data are lines of full width with line ends; a number cut short makes its line shorter."""
     body = data.rstrip(b"\r\n")
     lines, ended = body.split(b"\n"), len(body) < len(data)
-    per_line = _LINE // promise.width
+    per_line = _HEADER_LINE_LENGTH // promise.width
     per_record = math.ceil(promise.channels / per_line)
     wanted = promise.records * per_record
     if len(lines) != wanted or not ended:
@@ -225,7 +227,7 @@ def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
             raise InputError(path, f"data line {i + 1}", line.decode("latin-1"), f"must be {width} characters wide")
 
 
-def _heights(path: str | Path, road: Any, v: float) -> np.ndarray:
+def _heights_at(path: str | Path, road: Any, v: float) -> np.ndarray:
     """Heights (m, up) of every cross section at the lateral position ``v`` (m, positive left)."""
     if not road.v_min - 1e-9 <= v <= road.v_max + 1e-9:
         allowed = f"the file covers v = {road.v_min:g} to {road.v_max:g} m"

@@ -3,11 +3,11 @@
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.noise import ROAD, normal
+from models.core.noise import ROAD, normal_samples
 
-LONGEST, SHORTEST = 60.0, 0.5
+LONGEST_WAVELENGTH, SHORTEST_WAVELENGTH = 60.0, 0.5
 """Wavelengths (m); shorter ones are swallowed by the tyre's patch."""
-GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 def plane_waves(level: float, count: int = 48, seed: int = 0) -> np.ndarray:
@@ -22,9 +22,9 @@ def plane_waves(level: float, count: int = 48, seed: int = 0) -> np.ndarray:
         raise InputError("", "level", level, "must be 0 or more, in m")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10_000:
         raise InputError("", "waves", count, "must be a whole number from 1 to 10000")
-    edges = np.geomspace(2.0 * np.pi / LONGEST, 2.0 * np.pi / SHORTEST, count + 1)
+    edges = np.geomspace(2.0 * np.pi / LONGEST_WAVELENGTH, 2.0 * np.pi / SHORTEST_WAVELENGTH, count + 1)
     number = np.sqrt(edges[:-1] * edges[1:])
-    direction = 2.0 * np.pi * np.modf(GOLDEN * np.arange(count))[0]
+    direction = 2.0 * np.pi * np.modf(GOLDEN_RATIO * np.arange(count))[0]
     deviation = np.sqrt(np.pi * level * (1.0 / edges[:-1] - 1.0 / edges[1:]))
-    amplitudes = deviation[:, None] * normal(seed, 0, count, 2, source=ROAD)
+    amplitudes = deviation[:, None] * normal_samples(seed, 0, count, 2, source=ROAD)
     return np.column_stack([number * np.cos(direction), number * np.sin(direction), amplitudes])

@@ -24,7 +24,7 @@ class PolylineProfile(SplineProfile):
         return cls(s, pieces, name=name)
 
 
-def polyline(road: SplineProfile | tuple[ArrayLike, ArrayLike]) -> PolylineProfile:
+def polyline_through(road: SplineProfile | tuple[ArrayLike, ArrayLike]) -> PolylineProfile:
     """Return the polyline through the points of a spline, or through (stations, heights) in m."""
     if isinstance(road, SplineProfile):
         return PolylineProfile.through(*road.points, f"{road.name}, polyline")

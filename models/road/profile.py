@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from models.core.errors import InputError
 from models.road import kernels
 
-Samples = tuple[np.ndarray, np.ndarray]
+HeightsAndSlopes = tuple[np.ndarray, np.ndarray]
 
 OVERRUN_SHARE = 1e-9
 """Part of its length by which a road may be overrun: the rounding of s = v t is not the end of the road."""
@@ -39,11 +39,11 @@ class RoadProfile(Protocol):
         """Length (m) of the finest detail, which limits the step of adaptive solvers."""
         ...
 
-    def height_and_slope(self, s: ArrayLike) -> Samples:
+    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         ...
 
-    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
         ...
 
@@ -78,10 +78,10 @@ class SineProfile:
 
     def __post_init__(self) -> None:
         for field in ("amplitude", "wavenumber", "phase"):
-            object.__setattr__(self, field, _frozen(getattr(self, field), field, 1))
+            object.__setattr__(self, field, _read_only_copy(getattr(self, field), field, 1))
             if getattr(self, field).shape != self.amplitude.shape:
                 raise InputError("", field, getattr(self, field).shape, f"must have shape {self.amplitude.shape}")
-        object.__setattr__(self, "window_length", _window(self.window_length))
+        object.__setattr__(self, "window_length", _checked_window(self.window_length))
 
     @property
     def waves(self) -> kernels.Waves:
@@ -98,21 +98,21 @@ class SineProfile:
         """A quarter of the shortest wavelength (m)."""
         return float(0.5 * math.pi / np.abs(self.wavenumber).max())
 
-    def height_and_slope(self, s: ArrayLike) -> Samples:
+    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
-        flat, shape = _flat(s)
+        flat, shape = _flat_stations(s)
         height, slope = np.empty_like(flat), np.empty_like(flat)
-        kernels.sines(flat, self.waves, height, slope)
+        kernels.fill_sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1.
 
         Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
         sum of amplitude times wavenumber), as long as the rounding of s itself, 1e-16 of s times the
         wavenumber, stays below that.
         """
-        start, step = _finite(start, "start"), _finite(step, "step")
+        start, step = _checked_number(start, "start"), _checked_number(step, "step")
         height, slope = np.empty(count), np.empty(count)
         kernels.sines_uniform(start, step, self.waves, height, slope)
         return height, slope
@@ -147,9 +147,9 @@ class SplineProfile:
     name: str = "spline"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "station", _frozen(self.station, "station", 1))
-        object.__setattr__(self, "coefficients", _frozen(self.coefficients, "coefficients", 2))
-        object.__setattr__(self, "window_length", _window(self.window_length))
+        object.__setattr__(self, "station", _read_only_copy(self.station, "station", 1))
+        object.__setattr__(self, "coefficients", _read_only_copy(self.coefficients, "coefficients", 2))
+        object.__setattr__(self, "window_length", _checked_window(self.window_length))
         wanted = (self.station.size - 1, 4)
         if self.station.size < 2 or self.coefficients.shape != wanted:
             raise InputError(self.name, "coefficients", self.coefficients.shape, f"must have shape {wanted}")
@@ -165,7 +165,7 @@ class SplineProfile:
         """
         from scipy.interpolate import CubicSpline
 
-        s, zeta = _frozen(station, "station", 1), _frozen(height, "height", 1)
+        s, zeta = _read_only_copy(station, "station", 1), _read_only_copy(height, "height", 1)
         if s.size < 4 or zeta.shape != s.shape:
             raise InputError(name, "points", (s.size, zeta.size), "as many heights as stations, 4 or more, are needed")
         _check_order(name, s)
@@ -192,25 +192,25 @@ class SplineProfile:
         return float(np.diff(self.station).min())
 
     @property
-    def points(self) -> Samples:
+    def points(self) -> HeightsAndSlopes:
         """Stations (m) and heights (m, positive down, without the window), each of shape (n,)."""
         last = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
         return self.station, np.append(self.coefficients[:, 3], last)
 
-    def height_and_slope(self, s: ArrayLike) -> Samples:
+    def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
-        flat, shape = _flat(s)
+        flat, shape = _flat_stations(s)
         if flat.size:
-            self._check(float(flat.min()), float(flat.max()))
+            self._check_extent(float(flat.min()), float(flat.max()))
         height, slope = np.empty_like(flat), np.empty_like(flat)
-        kernels.cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
+        kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> Samples:
+    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
-        start, step = _finite(start, "start"), _finite(step, "step")
+        start, step = _checked_number(start, "start"), _checked_number(step, "step")
         last = start + max(count - 1, 0) * step
-        self._check(min(start, last), max(start, last))
+        self._check_extent(min(start, last), max(start, last))
         height, slope = np.empty(count), np.empty(count)
         road = (self.station, self.coefficients, self.window_length)
         kernels.cubics_uniform(start, step, *road, height, slope)
@@ -218,10 +218,10 @@ class SplineProfile:
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        self._check(s, s)
+        self._check_extent(s, s)
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
-    def _check(self, first: float, last: float) -> None:
+    def _check_extent(self, first: float, last: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
@@ -230,7 +230,7 @@ class SplineProfile:
             raise InputError(self.name, "arc length (m)", first if not first >= begin - slack else last, allowed)
 
 
-def _frozen(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
+def _read_only_copy(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
     """Read-only, contiguous copy with finite values only."""
     array = np.array(values, dtype=float, order="C")
     if array.ndim != dimensions or not np.isfinite(array).all():
@@ -239,19 +239,19 @@ def _frozen(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
     return array
 
 
-def _flat(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
+def _flat_stations(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
     """Arc lengths as a flat contiguous array, and the original shape."""
     array = np.asarray(s, dtype=float)
     return np.ascontiguousarray(array).reshape(-1), array.shape
 
 
-def _finite(value: float, field: str) -> float:
+def _checked_number(value: float, field: str) -> float:
     if not math.isfinite(value):
         raise InputError("", field, value, "must be a finite number")
     return float(value)
 
 
-def _window(length: float) -> float:
+def _checked_window(length: float) -> float:
     if not (math.isfinite(length) and length >= 0.0):
         raise InputError("", "window_length", length, "must be a finite length in m, 0 or more")
     return float(length)

@@ -18,7 +18,7 @@ class RoadUnderWheels:
     profile: RoadProfile
     speed: float
     wheelbase: float
-    kinks: tuple[float, ...] = (0.0,)
+    kink_stations: tuple[float, ...] = (0.0,)
     channels: int = 4
     period: None = None
     held: bool = False
@@ -47,6 +47,6 @@ class RoadUnderWheels:
 
     def knots(self, duration: float) -> np.ndarray:
         """Times at which a wheel passes a point where the road is only C2, such as its start."""
-        stations = np.array(self.kinks)
+        stations = np.array(self.kink_stations)
         times = np.concatenate((stations, stations + self.wheelbase)) / self.speed
         return np.unique(times[(times > 0) & (times < duration)])

@@ -13,7 +13,7 @@ from models.road.profile import SineProfile
 
 STUDY_GD = 2.4e-3
 """Roughness level of the study road: one-sided displacement density at 0.1 waves per metre, m^3."""
-WINDOW = 40.0
+FADE_IN_LENGTH = 40.0
 """Length of the fade-in, m."""
 HILL_AMPLITUDES = np.array([1.2, 0.6, 0.2])
 """m."""
@@ -23,7 +23,7 @@ HILL_LENGTHS = np.array([400.0, 150.0, 60.0])
 
 def hills_road() -> SineProfile:
     """A road with hills only: amplitudes 1.2, 0.6, 0.2 m at wavelengths 400, 150, 60 m, all with phase 0 at s = 0."""
-    return SineProfile(HILL_AMPLITUDES, 2.0 * math.pi / HILL_LENGTHS, np.zeros(3), WINDOW, "hills")
+    return SineProfile(HILL_AMPLITUDES, 2.0 * math.pi / HILL_LENGTHS, np.zeros(3), FADE_IN_LENGTH, "hills")
 
 
 def study_road(gd: float = STUDY_GD) -> SineProfile:
@@ -42,17 +42,17 @@ def study_road(gd: float = STUDY_GD) -> SineProfile:
     if not (math.isfinite(gd) and gd >= 0.0):
         raise InputError("", "gd", gd, "must be a finite density in m^3, 0 or more")
     hills = hills_road()
-    amplitude, wavenumber = roughness(gd, 0.05, 2.0, 60)
+    amplitude, wavenumber = road_waves(gd, 0.05, 2.0, 60)
     return SineProfile(
         np.concatenate([amplitude, hills.amplitude]),
         np.concatenate([wavenumber, hills.wavenumber]),
         np.concatenate([golden_phases(60), hills.phase]),
-        WINDOW,
+        FADE_IN_LENGTH,
         f"study, Gd = {gd:g} m^3",
     )
 
 
-def roughness(gd: float, n_min: float, n_max: float, waves: int) -> tuple[np.ndarray, np.ndarray]:
+def road_waves(gd: float, n_min: float, n_max: float, waves: int) -> tuple[np.ndarray, np.ndarray]:
     """Amplitudes (m) and wavenumbers (rad/m) of a road with the one-sided density gd (n / 0.1)^-2.
 
     Each wave stands for one of ``waves`` bins between ``n_min`` and ``n_max`` (waves per metre), spaced

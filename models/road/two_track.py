@@ -26,11 +26,11 @@ from models.vehicles.linear_vehicle import WheelPosition
 
 MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
 """Corners of the paper, rad/m."""
-LEVEL = 1.6e-5
+TRACK_DENSITY_LEVEL = 1.6e-5
 """S0 of the paper, m: what a bad scan of it lets one read; neither exponent nor split between the two is certain."""
 TRACK_CORRELATIONS = ("modelled", "uncorrelated", "equal")
 FRONT_REAR = ("delayed", "uncorrelated", "equal")
-CASES = {
+CORRELATION_CASES = {
     1: ("modelled", "uncorrelated"),
     2: ("modelled", "equal"),
     3: ("modelled", "delayed"),
@@ -83,7 +83,7 @@ class TwoTrackRoad:
 
 def road_of_level(
     half_track: float,
-    level: float = LEVEL,
+    level: float = TRACK_DENSITY_LEVEL,
     *,
     corners: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
     cutoff: float | None = None,
@@ -111,7 +111,7 @@ def on_track(wheels: Sequence[WheelPosition], y: float) -> tuple[WheelPosition, 
     return tuple(replace(wheel, y=y) for wheel in wheels)
 
 
-def excitation(
+def road_excitation(
     road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
 ) -> Excitation:
     """The road under the wheels, one filter per axle, each wheel at its own y.
@@ -130,11 +130,11 @@ def excitation(
     """
     _check_word("left_right", left_right, TRACK_CORRELATIONS)
     _check_word("front_rear", front_rear, FRONT_REAR)
-    behind = _lengths(wheels)
-    F, G, mean, roll = _filters(road)
+    behind = _axle_distances(wheels)
+    F, G, mean, roll = _both_filters(road)
     if left_right == "uncorrelated":
         F, G = block_diag(F, F), block_diag(G, G)
-    rows = np.array([_row(wheel, mean, roll, left_right, wheels) for wheel in wheels])
+    rows = np.array([_height_row(wheel, mean, roll, left_right, wheels) for wheel in wheels])
     axle = np.array([wheel.axle for wheel in wheels])
     heights = tuple(np.where((axle == i)[:, None], rows, 0.0) for i in range(len(behind)))
     lengths = tuple(0.0 for _ in behind) if front_rear == "equal" else behind
@@ -145,7 +145,7 @@ def input_covariance(
     road: TwoTrackRoad, wheels: Sequence[WheelPosition], left_right: str = "modelled", front_rear: str = "delayed"
 ) -> np.ndarray:
     """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
-    behind = excitation(road, wheels, left_right, front_rear).lengths
+    behind = road_excitation(road, wheels, left_right, front_rear).lengths
     out = np.zeros((len(wheels), len(wheels)))
     for i, first in enumerate(wheels):
         for j, two in enumerate(wheels):
@@ -158,7 +158,7 @@ def input_covariance(
     return out
 
 
-def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _both_filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Matrices F, G of both processes together, and the rows that read z_M and theta; a process of zero intensity is
     left out."""
     parts = [road.mean, road.roll] if road.roll.intensity else [road.mean]
@@ -166,7 +166,7 @@ def _filters(road: TwoTrackRoad) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     return F, G, H[0], H[1] if len(H) == 2 else np.zeros(len(F))
 
 
-def _row(
+def _height_row(
     wheel: WheelPosition, mean: np.ndarray, roll: np.ndarray, left_right: str, wheels: Sequence[WheelPosition]
 ) -> np.ndarray:
     """Factors of the filter states in the height under one wheel."""
@@ -182,7 +182,7 @@ def _row(
     return np.concatenate([height, other] if wheel.y >= 0.0 else [other, height])
 
 
-def _lengths(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
+def _axle_distances(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
     """Distance (m) of each axle behind the first."""
     axles = sorted({wheel.axle for wheel in wheels})
     if not axles or axles != list(range(len(axles))):

@@ -18,8 +18,8 @@ from scipy.signal import lfilter
 from scipy.special import hyp1f1
 
 from models.core.errors import InputError
-from models.core.noise import GYRO, GYRO_BIAS, normal
-from models.sensors.rotations import conjugate, integrate, matrix, product, skew
+from models.core.noise import GYRO, GYRO_BIAS, normal_samples
+from models.sensors.rotations import conjugate_quaternion, integrate, quaternion_product, rotation_matrix, skew_matrix
 
 
 def random_walk(deviation: float, rate: float) -> float:
@@ -41,7 +41,7 @@ def measured_attitude(
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
     its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
-    noise = np.stack([normal(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
+    noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
     return true_attitude(rates[:, None, :] + deviation * noise, period, start)
 
 
@@ -53,7 +53,7 @@ def true_attitude(rates: np.ndarray, period: float, start: np.ndarray) -> np.nda
 def error_rotation(measured: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Quaternions (..., 4) of the error E = S~ S^T, the rotation from the true to the measured attitude, in global
     components."""
-    return product(measured, conjugate(true))
+    return quaternion_product(measured, conjugate_quaternion(true))
 
 
 def mean_scalar(walks: np.ndarray, time: float) -> float:
@@ -83,10 +83,10 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, period: float, start: np.nd
     G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
     rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; period s; start (4,).
     """
-    mean = matrix(start)
-    for step in _exponentials((skew(rates) + spread(walks)) * period):
+    mean = rotation_matrix(start)
+    for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * period):
         mean = mean @ step
-    return mean @ matrix(true_attitude(rates, period, start)[-1]).T
+    return mean @ rotation_matrix(true_attitude(rates, period, start)[-1]).T
 
 
 def _exponentials(m: np.ndarray) -> np.ndarray:
@@ -104,7 +104,7 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
     return exponential
 
 
-def spread(walks: np.ndarray) -> np.ndarray:
+def noise_decay_matrix(walks: np.ndarray) -> np.ndarray:
     """Matrix 1/2 sum s_i^2 G_i^2 (3, 3) in 1/s: rate at which noise reduces the mean rotation matrix, in local
     components."""
     return 0.5 * np.diag(np.square(walks) - np.sum(np.square(walks)))
@@ -124,7 +124,7 @@ def euler_quaternions(turns: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Explicit Euler on eq. (25), never normalised: quaternions (paths, 4) after turns (n, paths, 3) in rad."""
     q = np.broadcast_to(np.asarray(start, dtype=float), (turns.shape[1], 4))
     for turn in turns:
-        q = q + 0.5 * product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
+        q = q + 0.5 * quaternion_product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
     return q
 
 
@@ -134,7 +134,7 @@ DEGREES_PER_ROOT_HOUR = math.pi / 180 / 60
 """In rad per sqrt(s)."""
 
 
-def bias(
+def bias_path(
     count: int, period: float, turn_on: float, instability: float, correlation_time: float, seed: int, path: int
 ) -> np.ndarray:
     """Bias (count,) in rad/s at samples ``period`` (s) apart, one path of the process.
@@ -143,9 +143,9 @@ def bias(
     exact, so the process does not depend on the sampling rate. Raises InputError for a time that is not above 0 or a
     deviation below it.
     """
-    _check(period=period, correlation_time=correlation_time)
-    _check(minimum=0.0, turn_on=turn_on, instability=instability)
-    drawn = normal(seed, path, count + 1, 1, source=GYRO_BIAS)[:, 0]
+    _check_numbers(period=period, correlation_time=correlation_time)
+    _check_numbers(minimum=0.0, turn_on=turn_on, instability=instability)
+    drawn = normal_samples(seed, path, count + 1, 1, source=GYRO_BIAS)[:, 0]
     kept = math.exp(-period / correlation_time)
     kicks = drawn[1:] * math.sqrt(-math.expm1(-2 * period / correlation_time))
     kicks[:1] = drawn[1:2]
@@ -159,15 +159,15 @@ def angle_variance(
 
     s^2 t + turn_on^2 t^2 + 2 instability^2 tau^2 (t/tau - 1 + exp(-t/tau)); the last bracket is written as
     (t/tau)^2 / 2 times 1F1(1; 3; -t/tau), which loses no digit at short times. walk in rad per sqrt(s), the others
-    in rad/s and s. Raises InputError as ``bias`` does, and for times below 0.
+    in rad/s and s. Raises InputError as ``bias_path`` does, and for times below 0.
     """
-    _check(correlation_time=correlation_time)
-    _check(minimum=0.0, time=float(np.min(time)), walk=walk, turn_on=turn_on, instability=instability)
+    _check_numbers(correlation_time=correlation_time)
+    _check_numbers(minimum=0.0, time=float(np.min(time)), walk=walk, turn_on=turn_on, instability=instability)
     wander = instability**2 * time**2 * hyp1f1(1, 3, -time / correlation_time)
     return walk**2 * time + turn_on**2 * time**2 + wander
 
 
-def _check(minimum: float = math.ulp(0.0), **given: float) -> None:
+def _check_numbers(minimum: float = math.ulp(0.0), **given: float) -> None:
     """Refuse the first number that is below ``minimum``."""
     for name, value in given.items():
         if not value >= minimum:

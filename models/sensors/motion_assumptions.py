@@ -7,13 +7,13 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.sensors.rigid_body_motion import LIMIT, NOISE_FACTOR, Quality, RecoveredMotion
+from models.sensors.rigid_body_motion import NOISE_FACTOR, UNEXPLAINED_SHARE_LIMIT, Quality, RecoveredMotion
 
-UPRIGHT = 1.4
+LARGEST_UPRIGHT_PITCH = 1.4
 """rad (80 degrees): beyond this pitch roll and yaw are hardly told apart, and none of them at a right angle."""
-TURNED = 0.2
+LARGEST_TURN_PER_SAMPLE = 0.2
 """rad per sample: cubics through four samples then err by some 1e-5 of a turn in each step."""
-LEVEL = 0.05
+LARGEST_LEVEL_TILT = 0.05
 """rad: a start that is tilted by more turns 0.5 m/s^2 of gravity into a false motion."""
 
 
@@ -38,8 +38,8 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
             "no angles tell this attitude: read the orientation itself",
             partial(_as_known, {"body": pitch}),
             "rad",
-            -UPRIGHT,
-            UPRIGHT,
+            -LARGEST_UPRIGHT_PITCH,
+            LARGEST_UPRIGHT_PITCH,
         ),
         Assumption(
             "fine samples",
@@ -47,15 +47,19 @@ def assumptions(record: Record, recovered: RecoveredMotion) -> list[Assumption]:
             "sample faster (sampling_rate)",
             partial(_as_known, {"body": turned}),
             "rad per sample",
-            most=TURNED,
+            upper_limit=LARGEST_TURN_PER_SAMPLE,
         ),
     ]
     if record.quality.rigid is not None and not record.quality.suspect:
-        listed.append(_rigid(record.quality))
+        listed.append(_rigid_body_assumption(record.quality))
     if record.from_rest:
         says, remedy = "the record begins at rest and level", "begin it where the body stands level"
-        tilt = _tilt(record.readings[0].mean(axis=0))
-        listed.append(Assumption("level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", most=LEVEL))
+        tilt = _tilt_from_gravity(record.readings[0].mean(axis=0))
+        listed.append(
+            Assumption(
+                "level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", upper_limit=LARGEST_LEVEL_TILT
+            )
+        )
     return listed
 
 
@@ -65,7 +69,7 @@ def cardan_pitch(recovered: RecoveredMotion) -> np.ndarray:
     return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))
 
 
-def _rigid(quality: Quality) -> Assumption:
+def _rigid_body_assumption(quality: Quality) -> Assumption:
     """Assumption that the sensors move with one rigid body. A single sensor that does not is left out, without an
     assumption about it."""
     size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
@@ -75,11 +79,11 @@ def _rigid(quality: Quality) -> Assumption:
         "mount them stiffer, leave out the one that gives way, or state their noise (deviation)",
         partial(_as_known, {"misfit": np.array([quality.share])}),
         "",
-        most=max(LIMIT, NOISE_FACTOR * quality.expected / size),
+        upper_limit=max(UNEXPLAINED_SHARE_LIMIT, NOISE_FACTOR * quality.expected_misfit / size),
     )
 
 
-def _tilt(first: np.ndarray) -> np.ndarray:
+def _tilt_from_gravity(first: np.ndarray) -> np.ndarray:
     """Angle (1,) in rad between a specific force (3,) and the upward vertical."""
     return np.array([np.arctan2(np.hypot(first[0], first[1]), -first[2])])
 

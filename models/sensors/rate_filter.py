@@ -12,9 +12,9 @@ from filterpy.kalman import ExtendedKalmanFilter
 from models.core.errors import InputError
 from models.sensors.rigid_body_motion import Spin, own_acceleration
 
-PAIRS = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
+SYMMETRIC_ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))
 """Entries of the symmetric part; in a plane the first three alone are known."""
-EYE = np.eye(3)
+UNIT_MATRIX = np.eye(3)
 
 
 class _Rates(ExtendedKalmanFilter):
@@ -40,25 +40,25 @@ def filter_rates(
         )
         raise InputError("", "noise", noise, allowed)
     frame, planar = spins.array.frame, spins.array.planar
-    pairs = PAIRS[: 3 if planar else 6]
+    pairs = SYMMETRIC_ENTRIES[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
-    filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * EYE
+    filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * UNIT_MATRIX
     filter_.Q = np.diag((period * noise * spins.array.own_gains(planar)) ** 2)
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
-    values = np.column_stack([0.5 * (spins.gradient[:, i, j] + spins.gradient[:, j, i]) for i, j in pairs])
+    values = np.column_stack([0.5 * (spins.rate_matrix[:, i, j] + spins.rate_matrix[:, j, i]) for i, j in pairs])
     known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
-        _predict(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)
-        filter_.update(values[i], _jacobian, _entries, args=indices, hx_args=indices)
+        _predict_rates(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)
+        filter_.update(values[i], _rate_product_jacobian, _skew_squared_entries, args=indices, hx_args=indices)
         rows.append((filter_.x.copy(), filter_.P))
     rates, covariances = (np.array(part) for part in zip(*rows, strict=True))
     return rates @ frame.T, np.sqrt(np.einsum("ij,njk,ik->ni", frame, covariances, frame))
 
 
-def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:
+def _predict_rates(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:
     """Predict over one period with the mean acceleration; with sensors in a plane, w1 and w2 also turn about the
     normal."""
     slope, change = np.zeros((3, 3)), alpha
@@ -66,15 +66,17 @@ def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) ->
         w = filter_.x + 0.5 * period * alpha  # the middle of the period
         slope = np.array([[0.0, -w[2], -w[1]], [w[2], 0.0, w[0]], [0.0, 0.0, 0.0]])
         change = alpha + np.array([-w[1] * w[2], w[0] * w[2], 0.0])
-    filter_.F = EYE + period * slope
+    filter_.F = UNIT_MATRIX + period * slope
     filter_.predict(period * change)
 
 
-def _entries(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _skew_squared_entries(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Entries of skew(w)^2 = w w^T - |w|^2 I."""
     return w[first] * w[second] - (first == second) * (w @ w)
 
 
-def _jacobian(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _rate_product_jacobian(w: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Derivatives (entries, 3) of the measured rate products by the angular rate w."""
-    return w[first, None] * EYE[second] + w[second, None] * EYE[first] - 2 * (first == second)[:, None] * w
+    return (
+        w[first, None] * UNIT_MATRIX[second] + w[second, None] * UNIT_MATRIX[first] - 2 * (first == second)[:, None] * w
+    )

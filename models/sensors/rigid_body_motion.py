@@ -11,10 +11,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.sensors.rotations import cardan, from_cardan, integrals, integrate, matrix, skew
+from models.sensors.rotations import (
+    cardan_angles,
+    cubic_integrals,
+    from_cardan,
+    integrate,
+    rotation_matrix,
+    skew_matrix,
+)
 from models.sensors.sensor_array import SensorArray, sensor_array
 
-LIMIT = 0.05
+UNEXPLAINED_SHARE_LIMIT = 0.05
 """Share of the relative accelerations that a rigid body may leave unexplained: a mount at 10 times the frequency of
 the motion moves by 1 % of it, one at twice by a third."""
 GRAVITY = 9.81
@@ -28,13 +35,13 @@ class Spin:
     """Differences of the readings at each instant, in the array's axes e1, e2, n: the matrix M of angular rates, and
     relative accelerations.
 
-    gradient : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
-    relative : (n, 3, sensors) in m/s^2, readings less their mean
+    rate_matrix : (n, 3, 3) in 1/s^2, M of eq. (18); for sensors in a plane (n, 3, 2), without its column along n
+    relative_acceleration : (n, 3, sensors) in m/s^2, readings less their mean
     """
 
     array: SensorArray
-    gradient: np.ndarray
-    relative: np.ndarray
+    rate_matrix: np.ndarray
+    relative_acceleration: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -43,14 +50,14 @@ class Quality:
 
     misfit : (n,) in m/s^2, rms over all sensors and axes of what no rigid motion explains, at each sample
     share : its rms over the record divided by that of the relative accelerations
-    expected : what the stated noise of the readings alone would leave (m/s^2)
+    expected_misfit : what the stated noise of the readings alone would leave (m/s^2)
     redundancy : equations per sample behind it; 0 means that nothing can be said
     suspect : the sensor without which the body is rigid; "" if there is no single one
     """
 
     misfit: np.ndarray
     share: float
-    expected: float
+    expected_misfit: float
     redundancy: int
     suspect: str = ""
 
@@ -59,11 +66,14 @@ class Quality:
         """Whether the readings agree with a rigid body; None if no redundant equation can check it."""
         if self.redundancy == 0:
             return None
-        return self.share <= LIMIT or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected
+        return (
+            self.share <= UNEXPLAINED_SHARE_LIMIT
+            or float(np.sqrt(np.mean(self.misfit**2))) <= NOISE_FACTOR * self.expected_misfit
+        )
 
 
 @dataclass(frozen=True)
-class Start:
+class StartState:
     """State at the first sample: local rates (rad/s), quaternion, velocity (m/s) and position (m), global."""
 
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -72,10 +82,10 @@ class Start:
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @staticmethod
-    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "Start":
+    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "StartState":
         """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
         level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
-        return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
+        return StartState((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,7 @@ class RecoveredMotion:
     """alpha (rad/s^2) and rates (rad/s) local, quaternions, and the reference point's acceleration (m/s^2),
     velocity (m/s) and position (m) in global axes, all (n, 3) but quaternions (n, 4)."""
 
-    alpha: np.ndarray
+    angular_acceleration: np.ndarray
     rates: np.ndarray
     orientation: np.ndarray
     acceleration: np.ndarray
@@ -104,14 +114,14 @@ class RecoveredMotion:
 
     def angles(self) -> np.ndarray:
         """Roll, pitch, yaw (n, 3) in rad; raises GimbalLock where they are not defined."""
-        return cardan(self.orientation)
+        return cardan_angles(self.orientation)
 
     def point(self, local_position: np.ndarray) -> np.ndarray:
         """Positions (n, 3) in m, global, of a point at local (3,) m of the body, eq. (15)."""
-        return self.position + matrix(self.orientation) @ np.asarray(local_position)
+        return self.position + rotation_matrix(self.orientation) @ np.asarray(local_position)
 
 
-def spin(array: SensorArray, readings: np.ndarray) -> Spin:
+def spin_from_readings(array: SensorArray, readings: np.ndarray) -> Spin:
     """Differences of the accelerometers' readings (n, sensors, 3) in m/s^2, and the matrix M of the rates; gravity
     cancels at any attitude.
 
@@ -142,7 +152,7 @@ def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
 
 def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
     """Angular acceleration (n, 3) in the array's axes from the differences of readings; w (n, 3) in the same axes."""
-    m = spins.gradient
+    m = spins.rate_matrix
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
     if spins.array.planar:
         about_first, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
@@ -158,7 +168,7 @@ def rates_up_to_sign(spins: Spin) -> np.ndarray:
     along the normal has a sign of its own, apart from that of the other two.
     """
     unsigned = _unsigned_in_plane if spins.array.planar else _unsigned_in_space
-    return unsigned(spins.gradient) @ spins.array.frame.T
+    return unsigned(spins.rate_matrix) @ spins.array.frame.T
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
@@ -184,10 +194,10 @@ def unexplained(spins: Spin) -> np.ndarray:
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
-    flat = _unsigned_in_plane(spins.gradient)
+    flat = _unsigned_in_plane(spins.rate_matrix)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if spins.array.flat else [_unsigned_in_space(spins.gradient)]
-    left = np.stack([spins.relative - _nearest_rigid(spins, w) for w in offers])
+    offers += [] if spins.array.flat else [_unsigned_in_space(spins.rate_matrix)]
+    left = np.stack([spins.relative_acceleration - _nearest_rigid(spins, w) for w in offers])
     least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[least, np.arange(len(least))]
 
@@ -197,16 +207,16 @@ def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
-    array, square = spins.array, skew(w) @ skew(w)
+    array, square = spins.array, skew_matrix(w) @ skew_matrix(w)
     weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
     rest = np.zeros_like(square)
-    rest[:, :, : array.weights.shape[1]] = spins.gradient
+    rest[:, :, : array.weights.shape[1]] = spins.rate_matrix
     moment = weights * (rest - square)
     turned = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
     return (turned + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
 
 
-def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
+def fit_quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Quality:
     """Quality of the rigid-body fit to readings (n, sensors, 3); ``noise`` is their standard deviation.
 
     Where it does not pass and sensors are left over, each is left out in turn to find the one that does not belong.
@@ -220,10 +230,10 @@ def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Qua
 
 
 def _quality_of(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
-    spins = spin(array, readings)
+    spins = spin_from_readings(array, readings)
     left = unexplained(spins)
     count = 3 * len(array.names)
-    size = float(np.sqrt(np.mean(spins.relative**2)))
+    size = float(np.sqrt(np.mean(spins.relative_acceleration**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
     share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
     return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
@@ -239,10 +249,10 @@ def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise:
     return _quality_of(rest, readings[:, keep], noise)
 
 
-def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
+def time_integral(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarray:
     """Sum of ``start`` and the time integral of values (n, ...), by cubics through four neighbouring samples: order 4
     in the period."""
-    return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(integrals(values, period), axis=0)])
+    return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(cubic_integrals(values, period), axis=0)])
 
 
 def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray:
@@ -251,23 +261,23 @@ def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
     mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
     """
-    if len(spins.gradient) < 4:
-        raise InputError("", "readings", len(spins.gradient), "at least four samples are needed to integrate them")
+    if len(spins.rate_matrix) < 4:
+        raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
     first = np.asarray(start) @ spins.array.frame
     if not spins.array.planar:
-        return integrated(own_acceleration(spins, np.zeros((1, 3))), period, first) @ spins.array.frame.T
-    m = spins.gradient
-    w3 = integrated(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
-    turn = np.exp(1j * integrated(w3, period, np.array(0.0)))
-    c = turn * integrated((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])
+        return time_integral(own_acceleration(spins, np.zeros((1, 3))), period, first) @ spins.array.frame.T
+    m = spins.rate_matrix
+    w3 = time_integral(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
+    turn = np.exp(1j * time_integral(w3, period, np.array(0.0)))
+    c = turn * time_integral((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])
     return np.column_stack([c.real, c.imag, w3]) @ spins.array.frame.T
 
 
-def motion(
+def recovered_motion(
     array: SensorArray,
     readings: np.ndarray,
     period: float,
-    start: Start | None = None,
+    start: StartState | None = None,
     zeroed: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
@@ -279,18 +289,18 @@ def motion(
     rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
-    start, cut_offs = start or Start(), cut_offs or CutOffs()
-    spins = spin(array, readings)
+    start, cut_offs = start or StartState(), cut_offs or CutOffs()
+    spins = spin_from_readings(array, readings)
     w = integrate_rates(spins, period, np.array(start.rates)) if rates is None else rates
-    w = _filtered(w, period, cut_offs.turning)
+    w = _high_passed(w, period, cut_offs.turning)
     orientation = integrate(w, period, np.array(start.orientation))
     if cut_offs.turning is not None:
-        orientation = from_cardan(*high_pass(np.unwrap(cardan(orientation), axis=0), period, cut_offs.turning).T)
+        orientation = from_cardan(*high_pass(np.unwrap(cardan_angles(orientation), axis=0), period, cut_offs.turning).T)
     alpha = angular_acceleration(spins, w)
     down = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
-    velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, cut_offs.position)
-    position = _filtered(integrated(velocity, period, np.array(start.position)), period, cut_offs.position)
+    velocity = _high_passed(time_integral(acceleration, period, np.array(start.velocity)), period, cut_offs.position)
+    position = _high_passed(time_integral(velocity, period, np.array(start.position)), period, cut_offs.position)
     return RecoveredMotion(alpha, w, orientation, acceleration, velocity, position)
 
 
@@ -303,11 +313,11 @@ def reference_acceleration(
     down: np.ndarray,
 ) -> np.ndarray:
     """Acceleration (n, 3) in m/s^2, global, of the reference point: the mean over all sensors, eq. (23)."""
-    lever = (skew(alpha) + skew(rates) @ skew(rates)) @ array.positions.mean(axis=0)
-    return np.einsum("nij,nj->ni", matrix(orientation), readings.mean(axis=1) - lever) + down
+    lever = (skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates)) @ array.positions.mean(axis=0)
+    return np.einsum("nij,nj->ni", rotation_matrix(orientation), readings.mean(axis=1) - lever) + down
 
 
-def _filtered(values: np.ndarray, period: float, cut_off: float | None) -> np.ndarray:
+def _high_passed(values: np.ndarray, period: float, cut_off: float | None) -> np.ndarray:
     return values if cut_off is None else high_pass(values, period, cut_off)
 
 
@@ -316,7 +326,7 @@ def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = GRAVITY) 
     return 0.5 * gravity * np.sin(tilt) * times**2
 
 
-ORDER = 2
+BUTTERWORTH_ORDER = 2
 """Order of the Butterworth filter, which runs forwards and backwards: no phase, half the amplitude at the cut-off."""
 
 
@@ -337,12 +347,12 @@ def check_cut_off(count: int, period: float, cut_off: float, file: str = "", pla
 def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:
     """Values (n, ...), sampled every ``period`` (s), with frequencies below ``cut_off`` (Hz) removed.
 
-    A Butterworth filter of order ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 + (fc/f)^4)
-    and nothing is delayed; the ends are extended by their mirror image, which
+    A Butterworth filter of order BUTTERWORTH_ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 +
+    (fc/f)^4) and nothing is delayed; the ends are extended by their mirror image, which
     keeps the mean that is taken out. Raises InputError as ``check_cut_off`` does.
     """
     from scipy.signal import butter, sosfiltfilt
 
     check_cut_off(len(values), period, cut_off)
-    sections = butter(ORDER, cut_off, "highpass", fs=1 / period, output="sos")
+    sections = butter(BUTTERWORTH_ORDER, cut_off, "highpass", fs=1 / period, output="sos")
     return sosfiltfilt(sections, values, axis=0, padtype="even", padlen=round(1 / (cut_off * period)))

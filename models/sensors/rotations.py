@@ -18,12 +18,12 @@ Rule = Literal["held", "mean", "cubic"]
 """How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""
 HALF_TURN = np.pi
 """Turn (rad) from sample to sample beyond which nobody can tell the way it went; the series of Magnus ends there."""
-UNIT = 1e-6
+UNIT_NORM_TOLERANCE = 1e-6
 """Largest departure of a quaternion's norm from 1."""
-LOCK = 1e-6
+GIMBAL_LOCK_COSINE = 1e-6
 """Cosine of pitch below which roll and yaw turn about the same axis: their errors grow as 1 / cosine, so that
 rounding alone would reach 1e-10 rad and a sensor's 1e-3 rad any angle at all."""
-SKEWED = 1e-6
+ORTHOGONALITY_TOLERANCE = 1e-6
 """Largest departure of S^T S from the identity that still counts as a rotation."""
 
 
@@ -45,21 +45,21 @@ class GimbalLock(InputError):
         )
 
 
-def skew(v: np.ndarray) -> np.ndarray:
+def skew_matrix(v: np.ndarray) -> np.ndarray:
     """Matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
     matrix = np.zeros((*v.shape, 3))
     matrix[..., 2, 1], matrix[..., 0, 2], matrix[..., 1, 0] = np.moveaxis(v, -1, 0)
     return matrix - np.swapaxes(matrix, -1, -2)
 
 
-def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Quaternion product p q (..., 4), the rotation q followed by p: S(p q) = S(p) S(q)."""
     scalar = p[..., :1] * q[..., :1] - np.sum(p[..., 1:] * q[..., 1:], axis=-1, keepdims=True)
     vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
     return np.concatenate([scalar, vector], axis=-1)
 
 
-def conjugate(q: np.ndarray) -> np.ndarray:
+def conjugate_quaternion(q: np.ndarray) -> np.ndarray:
     """Quaternions (..., 4) of the inverse rotations."""
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -70,7 +70,7 @@ def exponential(turn: np.ndarray) -> np.ndarray:
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * turn], axis=-1)
 
 
-def logarithm(q: np.ndarray) -> np.ndarray:
+def rotation_vector(q: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) in rad, of length 0 to pi, of unit quaternions (..., 4)."""
     near = np.where(q[..., :1] < 0, -q, q)  # the shorter way round
     size = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
@@ -78,7 +78,7 @@ def logarithm(q: np.ndarray) -> np.ndarray:
     return near[..., 1:] * np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 0)
 
 
-def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
+def turns_between_samples(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
     """Rotation vectors (n - 1, ..., 3) in rad from each sample of local rates (n, ..., 3) in rad/s to the next one.
 
     "held" : the rate of the sample before, h w0, which is exact for rates that are constant over a period;
@@ -102,7 +102,7 @@ def turns(rates: np.ndarray, period: float, rule: Rule = "cubic") -> np.ndarray:
     _check_turned(rates, period)
     if rule == "mean":
         return 0.5 * period * (before + after)
-    return integrals(rates, period) + period**2 / 12 * np.cross(before, after)
+    return cubic_integrals(rates, period) + period**2 / 12 * np.cross(before, after)
 
 
 def _check_turned(rates: np.ndarray, period: float) -> None:
@@ -113,7 +113,7 @@ def _check_turned(rates: np.ndarray, period: float) -> None:
         raise InputError("", "rates", fastest, f"must be at most {HALF_TURN / period:.4g} rad/s {samples}")
 
 
-def integrals(values: np.ndarray, period: float) -> np.ndarray:
+def cubic_integrals(values: np.ndarray, period: float) -> np.ndarray:
     """Integrals (n - 1, ...) over each period of the cubics through four neighbouring samples (n, ...), n >= 4."""
     inner = -values[:-3] + 13 * values[1:-2] + 13 * values[2:-1] - values[3:]
     first = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
@@ -124,21 +124,21 @@ def integrals(values: np.ndarray, period: float) -> np.ndarray:
 def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = "cubic") -> np.ndarray:
     """Quaternions (n, ..., 4) at the samples of local rates (n, ..., 3) in rad/s, eq. (22); start (..., 4).
 
-    Each step is the exact exponential of its rotation vector (``turns``), and each result is divided by its
-    norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
-    Raises InputError for a start that is no unit quaternion, and as ``turns`` does.
+    Each step is the exact exponential of its rotation vector (``turns_between_samples``), and each result is divided by
+    its norm, which therefore stays 1 within rounding for ever. Several bodies stand side by side in the middle axes.
+    Raises InputError for a start that is no unit quaternion, and as ``turns_between_samples`` does.
     """
-    if not np.abs(np.linalg.norm(np.asarray(start, dtype=float), axis=-1) - 1.0).max() <= UNIT:
+    if not np.abs(np.linalg.norm(np.asarray(start, dtype=float), axis=-1) - 1.0).max() <= UNIT_NORM_TOLERANCE:
         raise InputError("", "start", start, "must be unit quaternions")
-    steps = exponential(turns(rates, period, rule))
+    steps = exponential(turns_between_samples(rates, period, rule))
     count, middle = len(steps), steps.shape[1:-1]
     first = np.broadcast_to(np.asarray(start, dtype=float), (*middle, 4)).reshape(-1, 4)
     flat = np.ascontiguousarray(steps.reshape(count, -1, 4))
-    return _chain(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
+    return _chain_rotations(np.ascontiguousarray(first), flat).reshape(count + 1, *middle, 4)
 
 
 @njit(cache=True)
-def _chain(start, steps):
+def _chain_rotations(start, steps):
     """Normalised running products start, start steps[0], start steps[0] steps[1] ...: from shapes (m, 4) and (n, m, 4)
     to (n + 1, m, 4)."""
     attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
@@ -159,18 +159,18 @@ def _chain(start, steps):
     return attitudes
 
 
-def matrix(q: np.ndarray) -> np.ndarray:
+def rotation_matrix(q: np.ndarray) -> np.ndarray:
     """Matrices S (..., 3, 3), local to global, of unit quaternions (..., 4), eq. (21)."""
     a, v = q[..., 0, None, None], q[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
     square = np.trace(outer, axis1=-2, axis2=-1)[..., None, None]
-    return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew(v)
+    return (a * a - square) * np.eye(3) + 2 * outer + 2 * a * skew_matrix(v)
 
 
 def from_matrix(s: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), scalar 0 or more, of matrices (..., 3, 3); raises ValueError if one is no rotation."""
     off = np.abs(np.swapaxes(s, -1, -2) @ s - np.eye(3)).max()
-    if not off < SKEWED or not (np.linalg.det(s) > 0).all():
+    if not off < ORTHOGONALITY_TOLERANCE or not (np.linalg.det(s) > 0).all():
         raise ValueError(f"not a rotation: S^T S departs from the identity by {off:.3g}, or S turns left into right")
     return Rotation.from_matrix(s).as_quat(canonical=True, scalar_first=True)
 
@@ -181,19 +181,19 @@ def from_cardan(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> np.ndarray
     parts = [
         exponential(np.asarray(angle, dtype=float)[..., None] * axes[i]) for i, angle in enumerate((roll, pitch, yaw))
     ]
-    return product(product(parts[2], parts[1]), parts[0])
+    return quaternion_product(quaternion_product(parts[2], parts[1]), parts[0])
 
 
-def cardan(q: np.ndarray) -> np.ndarray:
+def cardan_angles(q: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw (..., 3) in rad of unit quaternions (..., 4): the sequence z-y'-x'' of vehicles (ISO 8855).
 
     S = Rz(yaw) Ry(pitch) Rx(roll); pitch lies within +-pi/2 and is positive nose up, roll and yaw within +-pi.
-    Raises GimbalLock where cos(pitch) < LOCK.
+    Raises GimbalLock where cos(pitch) < GIMBAL_LOCK_COSINE.
     """
-    s = matrix(q)
+    s = rotation_matrix(q)
     cosine = np.hypot(s[..., 0, 0], s[..., 1, 0])
     pitch = np.arctan2(-s[..., 2, 0], cosine)
-    locked = np.flatnonzero(cosine < LOCK)
+    locked = np.flatnonzero(cosine < GIMBAL_LOCK_COSINE)
     if len(locked):
         raise GimbalLock(int(locked[0]), float(pitch.ravel()[locked[0]]))
     roll, yaw = np.arctan2(s[..., 2, 1], s[..., 2, 2]), np.arctan2(s[..., 1, 0], s[..., 0, 0])

@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 
 from models.core.errors import InputError
-from models.sensors.rotations import from_cardan, matrix, skew
+from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
 
 Formula = Literal["auto", "spatial", "plane"]
-LINE = 1e-3
+LINE_SPREAD_RATIO = 1e-3
 """Second spread by the first one below which sensors lie on a line: on a car some millimetres, no better known."""
 FLAT_SPREAD_RATIO = 0.1
 """Third spread by the second one below which "auto" takes the formula for sensors in a plane."""
-PLANE = 1e-6
+PLANE_SPREAD_RATIO = 1e-6
 """The same below which they lie in a plane to rounding, and there is no choice."""
 
 
@@ -51,7 +51,7 @@ class SensorArray:
         """Whether the sensors lie in a plane, except for rounding."""
         return self.weights.shape[1] == 2
 
-    def gains(self, planar: bool | None = None) -> np.ndarray:
+    def noise_gains(self, planar: bool | None = None) -> np.ndarray:
         """Ratios (3,), in 1/m, of the standard deviation of the angular acceleration about x, y, z to that of the
         readings.
 
@@ -59,11 +59,13 @@ class SensorArray:
         formula gives infinite gains.
         """
         squares = self.own_gains(self.planar if planar is None else planar) ** 2
-        shares = np.where(np.abs(self.frame) > PLANE, self.frame**2, 0.0)  # infinity times a rounding error
+        shares = np.where(
+            np.abs(self.frame) > PLANE_SPREAD_RATIO, self.frame**2, 0.0
+        )  # infinity times a rounding error
         return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
-        """Noise gains as ``gains``, about the array's axes e1, e2, n."""
+        """Noise gains as ``noise_gains``, about the array's axes e1, e2, n."""
         first, two, three = self.inverse_squares
         return np.sqrt(
             [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
@@ -84,17 +86,17 @@ class SensorArray:
             lies = "lie in a plane" if self.flat else f"lie nearly in a plane (flatness {flatness:.2g})"
             lines += [
                 f"the sensors {lies} with the normal ({normal}): about axes in that plane the plain formula "
-                f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified()}; "
+                f"{'gives half the angular acceleration plus a bias' if self.flat else self._amplified_noise()}; "
                 "the formula for a plane is used, integrated together with the rates"
             ]
-        gains = ", ".join(f"{value:.2f}" for value in self.gains())
+        gains = ", ".join(f"{value:.2f}" for value in self.noise_gains())
         lines += [f"noise of 1 m/s^2 in the readings gives ({gains}) rad/s^2 in roll, pitch and yaw acceleration"]
         if self.redundancy == 0:
             lines += ["three sensors leave nothing over to check that the body is rigid: a loose one is not found"]
         return lines
 
-    def _amplified(self) -> str:
-        return f"amplifies noise {max(self.gains(False) / self.gains(True)):.1f} times as much"
+    def _amplified_noise(self) -> str:
+        return f"amplifies noise {max(self.noise_gains(False) / self.noise_gains(True)):.1f} times as much"
 
 
 def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "auto") -> SensorArray:
@@ -110,14 +112,14 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
     if places.shape != (len(names), 3) or not np.isfinite(places).all():
         raise InputError("", "sensors", None, "each position must be three finite numbers x, y, z in m")
     frame, spreads, rows = np.linalg.svd((places - places.mean(axis=0)).T, full_matrices=False)
-    if not spreads[1] > LINE * spreads[0]:
+    if not spreads[1] > LINE_SPREAD_RATIO * spreads[0]:
         raise InputError(
             "",
             "sensors",
             None,
             "the sensors lie on a line, about which the body could turn unseen: put one of them elsewhere",
         )
-    flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE, FLAT_SPREAD_RATIO))
+    flat, near = (spreads[2] < limit * spreads[1] for limit in (PLANE_SPREAD_RATIO, FLAT_SPREAD_RATIO))
     if formula == "spatial" and flat:
         raise InputError(
             "",
@@ -133,7 +135,7 @@ def sensor_array(positions: Mapping[str, Sequence[float]], formula: Formula = "a
     return SensorArray(names, places, frame * hand, spreads, bool(planar), weights)
 
 
-def readings(
+def sensor_readings(
     places: np.ndarray,
     pitch: np.ndarray,
     rate: np.ndarray,
@@ -148,7 +150,7 @@ def readings(
     """
     count = len(pitch)
     none = np.zeros(count)
-    turn = matrix(from_cardan(none, pitch, none))
+    turn = rotation_matrix(from_cardan(none, pitch, none))
     alpha, w = (np.column_stack([none, values, none]) for values in (pitch_acceleration, rate))
     felt = (heave_acceleration - gravity)[:, None] * turn[:, 2]  # S^T along the global vertical
     return in_space(places, felt, w, alpha)
@@ -160,7 +162,7 @@ def in_space(places: np.ndarray, specific_forces: np.ndarray, w: np.ndarray, alp
     places : (sensors, 3) in m from a point of the body with ``specific_forces`` (n, 3); w, alpha : (n, 3), the body's
     rates and their derivatives about its own axes, rad/s and rad/s^2. Any right-handed axes.
     """
-    lever = skew(alpha) + skew(w) @ skew(w)
+    lever = skew_matrix(alpha) + skew_matrix(w) @ skew_matrix(w)
     return specific_forces[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 
 

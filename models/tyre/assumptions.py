@@ -18,7 +18,7 @@ def assumptions(table: TyreTable, load: float) -> list[Assumption]:
             "ask for smaller options.slip_angles, or name a table in tyres.files that reaches farther",
             lambda run: {"slip angles": run["slip_angle"]},
             "deg",
-            most=float(np.rad2deg(table.angles[-1])) * (1.0 + 1e-9),
+            upper_limit=float(np.rad2deg(table.angles[-1])) * (1.0 + 1e-9),
         )
     ]
     if table.loads.size > 1:

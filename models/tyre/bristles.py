@@ -27,10 +27,10 @@ from models.machine.stack import start
 
 FADING_SPEED = 0.1
 """Speed (m/s) of the tread below which slip is relative to it."""
-THREE, ORDER = KINDS["three"], MARCHES["second-order"]
+THREE_BRISTLES, SECOND_ORDER_MARCH = KINDS["three"], MARCHES["second-order"]
 FIRST_FLEXIBILITY = 7
 """Place of the first flexibility among a contact's numbers."""
-UNIT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
+UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
 """A contact that sticks all over and whose side force is C."""
 
 
@@ -46,9 +46,9 @@ def shape_factor(cells: int) -> float:
     """Ratio of the slip stiffness to a^2 b k, with bristle stiffness k, for a patch with ``cells`` cells; near the
     exact 8/3."""
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
-    for name, value in UNIT.items():
+    for name, value in UNIT_CONTACT.items():
         contacts[name] = value
-    forces(contacts, *net(cells).records, THREE, ORDER, answers)
+    forces(contacts, *net(cells).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
     return -float(answers["fy"][0])
 
 
@@ -68,12 +68,12 @@ def tyre_forces(contacts, slides, strips, cells, middle, answer):
     for i in range(w):
         slowest = min(slowest, slides[i, 3])
     _creepages(1.0, patches, slides)
-    forces_within(patches, lines, along, THREE, ORDER, room, answers)
+    forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
         _creepages(-1.0, patches, slides)
-        forces_within(patches, lines, along, THREE, ORDER, room, backwards)
-        _mix(slides, backwards, answers)
+        forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        _blend_directions(slides, backwards, answers)
 
 
 @lean
@@ -86,7 +86,7 @@ def _creepages(sign, patches, slides):
 
 
 @lean
-def _mix(slides, backwards, answers):
+def _blend_directions(slides, backwards, answers):
     """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
     view."""
     for i in range(len(answers)):
@@ -96,7 +96,7 @@ def _mix(slides, backwards, answers):
         answer.mz = share * answer.mz - (1.0 - share) * behind.mz
 
 
-def brush(
+def brush_forces(
     load: float, mu: float, half_length: float, half_width: float, stiffness: float, slides: np.ndarray, cells: int = 21
 ) -> np.ndarray:
     """Forces fx, fy (N) and moments mz (N m), (m, 3), of one tyre for sliding velocities ``slides`` (m, 4) as in

@@ -17,14 +17,14 @@ Friction = Callable[[np.ndarray, float], np.ndarray]
 """Friction, from 0 on, at slips from 0 on (tan of the slip angle, across) under a load (N)."""
 
 
-def graded(end: float, first: float, count: int) -> np.ndarray:
+def graded_nodes(end: float, first: float, count: int) -> np.ndarray:
     """Nodes from 0 to ``end`` with spacings that grow in proportion to x + ``first``."""
     nodes = first * np.expm1(np.linspace(0.0, np.log1p(end / first), count))
     nodes[-1] = end
     return nodes
 
 
-ANGLES, SLIPS = graded(np.pi / 2.0, 0.03, 261), graded(1.0, 0.02, 201)
+ANGLE_NODES, SLIP_NODES = graded_nodes(np.pi / 2.0, 0.03, 261), graded_nodes(1.0, 0.02, 201)
 """Nodes (rad; 1) between which the tables of the magic formula's surfaces are met to 1e-4 of mu."""
 
 
@@ -32,8 +32,8 @@ def by_similarity(
     along: Friction,
     across: Friction,
     loads: np.ndarray,
-    angles: np.ndarray = ANGLES,
-    slips: np.ndarray = SLIPS,
+    angles: np.ndarray = ANGLE_NODES,
+    slips: np.ndarray = SLIP_NODES,
     name: str = "",
 ) -> TyreTable:
     """Tyre table from a friction curve along the wheel and one across it, combined by similarity.
@@ -46,13 +46,13 @@ def by_similarity(
     safe = np.maximum(total, 1e-300)
     mu_x = np.stack([along(total, load) * slips / safe for load in loads], axis=1)
     both = np.stack([across(total, load) * tangent / safe for load in loads], axis=1)
-    g, h = factors(both)
+    g, h = product_factors(both)
     g[0] = _at_no_angle(across, slips, loads)
     over = np.maximum(np.hypot(mu_x, g[:, None, :] * h[:, :, None]) / max(mu_x.max(), both.max()), 1.0)
     return TyreTable(angles, slips, loads, mu_x / over, g / over.max(axis=1), h, name)
 
 
-def factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def product_factors(mu_y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Factors g (a, s) and h (a, f) whose product approximates mu_y (a, f, s): h is mu_y at slip 0, and g the best fit
     for all loads.
 
@@ -133,20 +133,23 @@ PACEJKA = {
 and methodology for optimal trajectory generation in safety-critical road-vehicle manoeuvres, Vehicle System Dynamics 52
 (2014), as retyped in a public repository; the attribution is recalled, not checked."""
 
-Pure = Callable[[np.ndarray], np.ndarray]
-SURFACES: dict[str, tuple[Pure, Pure]] = {**PACEJKA, **{k: (c, c) for k, c in BURCKHARDT.items()}}
+PureSlipCurve = Callable[[np.ndarray], np.ndarray]
+NAMED_SURFACES: dict[str, tuple[PureSlipCurve, PureSlipCurve]] = {
+    **PACEJKA,
+    **{k: (c, c) for k, c in BURCKHARDT.items()},
+}
 """All surfaces that have a name, along and across."""
 
 
-def surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
-    """Table of one of ``SURFACES``, its friction times ``scale`` at a load (N).
+def table_of_surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
+    """Table of one of ``NAMED_SURFACES``, its friction times ``scale`` at a load (N).
 
     fall : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
     quarter of it to twice it, and constant beyond.
     """
-    if name not in SURFACES:
-        raise InputError("", "surface", name, "no such surface", tuple(SURFACES))
-    along, across = SURFACES[name]
+    if name not in NAMED_SURFACES:
+        raise InputError("", "surface", name, "no such surface", tuple(NAMED_SURFACES))
+    along, across = NAMED_SURFACES[name]
     if not 0.0 <= fall < 1.0:
         raise InputError(name, "fall", fall, "must be from 0 to below 1")
     loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])

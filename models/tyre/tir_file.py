@@ -19,15 +19,15 @@ from models.core.tables import whole_text
 from models.tyre.magic_formula import MagicFormulaCurve, by_similarity
 from models.tyre.tyre_table import TyreTable
 
-UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
+ACCEPTED_UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
 """Units in which the formula is read; a file in others is refused."""
-VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
+FITTYP_VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
 """FITTYP of the property files whose equations these are."""
-NEEDED = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
+NEEDED_KEYS = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 UNIT_SCALES = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
 """Scaling factors, 1 where the file has none; all other coefficients are then 0."""
-COEFFICIENT = re.compile(r"P[CDEK][XY]\d")
-LOADS = 9
+COEFFICIENT_PATTERN = re.compile(r"P[CDEK][XY]\d")
+LOAD_NODES = 9
 """Nodes of the load from FZMIN to FZMAX."""
 
 
@@ -41,9 +41,9 @@ class Property:
 
 def tir_table(path: str | Path) -> TyreTable:
     """Table of the tyre in a `.tir` file; raises InputError with file, line, key, value and the allowed values."""
-    properties = _properties(path)
-    _check(path, properties)
-    named = (name for name in properties if name in (*NEEDED, *UNIT_SCALES) or COEFFICIENT.fullmatch(name))
+    properties = _keys_of_sections(path)
+    _check_properties(path, properties)
+    named = (name for name in properties if name in (*NEEDED_KEYS, *UNIT_SCALES) or COEFFICIENT_PATTERN.fullmatch(name))
     c = defaultdict(float, dict.fromkeys(UNIT_SCALES, 1.0)) | {
         name: _number_of(path, properties, name) for name in named
     }
@@ -53,7 +53,7 @@ def tir_table(path: str | Path) -> TyreTable:
             raise _wrong_value(path, properties, name, "must be a load above 0 and at most 1e7 N")
     if not least < most:
         raise _wrong_value(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
-    loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
+    loads = np.unique(np.concatenate((np.linspace(least, most, LOAD_NODES), np.clip([nominal], least, most))))
     curves = {load: (longitudinal_formula(c, load), lateral_formula(c, load)) for load in loads}
     _check_curves(path, curves)
     return by_similarity(
@@ -88,7 +88,7 @@ def _load_excess(c: dict[str, float], load: float) -> tuple[float, float]:
     return nominal, (load - nominal) / nominal
 
 
-def _properties(path: str | Path) -> dict[str, Property]:
+def _keys_of_sections(path: str | Path) -> dict[str, Property]:
     """Keys of all sections, in capital letters."""
     properties: dict[str, Property] = {}
     for line, row in enumerate(whole_text(path).splitlines(), start=1):
@@ -96,7 +96,7 @@ def _properties(path: str | Path) -> dict[str, Property]:
         name, equals, value = plain.partition("=")
         if equals:
             key = name.strip().upper()
-            if key in properties and key in (*NEEDED, *UNITS):
+            if key in properties and key in (*NEEDED_KEYS, *ACCEPTED_UNITS):
                 raise InputError(
                     path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
                 )
@@ -104,22 +104,22 @@ def _properties(path: str | Path) -> dict[str, Property]:
     return properties
 
 
-def _check(path: str | Path, properties: dict[str, Property]) -> None:
-    for name, allowed in UNITS.items():
+def _check_properties(path: str | Path, properties: dict[str, Property]) -> None:
+    for name, allowed in ACCEPTED_UNITS.items():
         if name not in properties:
             raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
         if properties[name].text.lower() not in allowed:
             raise _wrong_value(path, properties, name, f"must be '{allowed[0]}'")
-    if "FITTYP" in properties and _number_of(path, properties, "FITTYP") not in VERSIONS:
+    if "FITTYP" in properties and _number_of(path, properties, "FITTYP") not in FITTYP_VERSIONS:
         raise _wrong_value(
             path,
             properties,
             "FITTYP",
             "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)",
         )
-    for name in NEEDED:
+    for name in NEEDED_KEYS:
         if name not in properties:
-            raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED))
+            raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
 
 
 def _number_of(path: str | Path, properties: dict[str, Property], name: str) -> float:

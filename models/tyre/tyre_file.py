@@ -2,7 +2,7 @@
 
 Columns ``slip angle [deg], load [kN], slip [-], mu_x [-], mu_y [-]`` in any order, each with one of its units (rad, N,
 %), all combinations once, rows in any order; without the column of the load friction is that of every load. mu_y is
-brought to the product g h, which must meet it to ``PRODUCT``.
+brought to the product g h, which must meet it to ``PRODUCT_TOLERANCE``.
 """
 
 from pathlib import Path
@@ -10,22 +10,27 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.tables import NEWTONS, RADIANS, SHARES, Columns, RowBlock, blocks
-from models.tyre.magic_formula import factors
+from models.core.tables import NEWTONS, RADIANS, SHARES, Columns, RowBlock, table_blocks
+from models.tyre.magic_formula import product_factors
 from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
 
-FRICTION: Columns = {"slip angle": {"deg": RADIANS["deg"], "rad": 1.0}, "slip": SHARES, "mu_x": SHARES, "mu_y": SHARES}
-COLUMNS: tuple[Columns, ...] = (FRICTION, {**FRICTION, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
+FRICTION_COLUMNS: Columns = {
+    "slip angle": {"deg": RADIANS["deg"], "rad": 1.0},
+    "slip": SHARES,
+    "mu_x": SHARES,
+    "mu_y": SHARES,
+}
+COLUMN_SETS: tuple[Columns, ...] = (FRICTION_COLUMNS, {**FRICTION_COLUMNS, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
 ANY_LOAD = 1e4
 """Load (N) of the only node where a file has none."""
-PRODUCT = 0.03
+PRODUCT_TOLERANCE = 0.03
 """Share of the largest friction to which g h must meet mu_y."""
 MOST_NODES = 3_000_000
 
 
 def tyre_table(path: str | Path) -> TyreTable:
     """Table from a CSV file; raises InputError that names file, line, column, value and what is allowed."""
-    lines, columns = _columns(Path(path))
+    lines, columns = _columns_in_si(Path(path))
     columns.setdefault("load", np.full(len(lines), ANY_LOAD))
     _check_ranges(path, lines, columns)
     axes = [np.unique(columns[name], return_inverse=True) for name in ("slip angle", "load", "slip")]
@@ -40,16 +45,16 @@ def tyre_table(path: str | Path) -> TyreTable:
         )
     row = _row_of_each(path, lines, np.ravel_multi_index([place for _, place in axes], shape), axes)
     mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
-    g, h = factors(mu_y)
+    g, h = product_factors(mu_y)
     _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
     return TyreTable(angles, slips, loads, mu_x, g, h, Path(path).name)
 
 
-def _columns(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _columns_in_si(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Line number (n,) of every row, and columns (n,) in SI; raises InputError for the first row with an error."""
     parts: list[RowBlock] = []
-    for block in blocks(path, COLUMNS):
-        for row, wrong in block.wrong.items():
+    for block in table_blocks(path, COLUMN_SETS):
+        for row, wrong in block.faulty_rows.items():
             raise InputError(path, f"line {block.lines[row]}", None, wrong)
         parts.append(block)
     if not parts:
@@ -105,7 +110,7 @@ def _check_product(
 ) -> None:
     off = np.abs(product - mu_y)
     worst = int(off.argmax())
-    if off.flat[worst] > PRODUCT * max(mu_x.max(), mu_y.max()):
+    if off.flat[worst] > PRODUCT_TOLERANCE * max(mu_x.max(), mu_y.max()):
         raise _error_in_row(
             path,
             lines,
@@ -113,6 +118,7 @@ def _check_product(
             row.flat[worst],
             mu_y.flat[worst],
             "is no product of g(slip angle, slip) and "
-            f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than {PRODUCT:.0%} of the "
+            f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than "
+            f"{PRODUCT_TOLERANCE:.0%} of the "
             "largest away",
         )

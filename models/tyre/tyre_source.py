@@ -3,28 +3,28 @@
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.tyre.magic_formula import PACEJKA, SURFACES, surface
+from models.tyre.magic_formula import NAMED_SURFACES, PACEJKA, table_of_surface
 from models.tyre.tir_file import tir_table
 from models.tyre.tyre_file import tyre_table
 from models.tyre.tyre_table import TyreTable
 
-READERS = {".csv": tyre_table, ".tir": tir_table}
-SCALES = (0.0, 2.0)
+READER_OF_EXTENSION = {".csv": tyre_table, ".tir": tir_table}
+SCALE_BOUNDS = (0.0, 2.0)
 """Factors on friction lie above the first and up to the second."""
 
 
 def from_file(path: Path) -> TyreTable:
     """Tyre table from a file whose extension gives the format; raises InputError if the file holds no such table."""
-    if path.suffix.lower() not in READERS:
-        raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READERS))
-    return READERS[path.suffix.lower()](path)
+    if path.suffix.lower() not in READER_OF_EXTENSION:
+        raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READER_OF_EXTENSION))
+    return READER_OF_EXTENSION[path.suffix.lower()](path)
 
 
-def named(name: str, rear: bool = False) -> TyreTable:
+def named_tyre(name: str, rear: bool = False) -> TyreTable:
     """Tyre table of a named surface; with ``rear``, the rear tyre's table if the surface has a separate one."""
     rear_name = f"{name}/rear"
-    return surface(rear_name if rear and rear_name in PACEJKA else name)
+    return table_of_surface(rear_name if rear and rear_name in PACEJKA else name)
 
 
-NAMES = tuple(name for name in SURFACES if "/" not in name)
+SURFACE_NAMES = tuple(name for name in NAMED_SURFACES if "/" not in name)
 """Surfaces that have a name."""

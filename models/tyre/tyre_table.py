@@ -17,7 +17,7 @@ from models.machine.compiled import lean
 
 LARGEST_FRICTION = 3.0
 """No tyre on any road has more."""
-ROUNDED = 0.01
+ROUNDING_SHARE = 0.01
 """Share by which friction in both directions together may be above the largest in one: figures are rounded."""
 
 
@@ -80,7 +80,7 @@ class TyreTable:
                 values + share * np.diff(values, axis=0, append=values[-1:]) for values in (self.mu_x, self.g, self.h)
             )
             total = np.hypot(x, g[:, None, :] * h[:, :, None])
-            if total.max() > peak * (1.0 + ROUNDED):
+            if total.max() > peak * (1.0 + ROUNDING_SHARE):
                 i, j, k = np.unravel_index(total.argmax(), total.shape)
                 place = (
                     f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip {self.slips[k]:g}"
@@ -90,7 +90,7 @@ class TyreTable:
                     place,
                     float(total[i, j, k]),
                     "both together must not be above the largest "
-                    f"of either alone, {peak:.6g}, by more than {ROUNDED:.0%}",
+                    f"of either alone, {peak:.6g}, by more than {ROUNDING_SHARE:.0%}",
                 )
 
     @property
@@ -114,7 +114,7 @@ class TyreTable:
         mu_x, g, h = self._at_nodes(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
-    def figures(self, load: float) -> dict[str, float]:
+    def characteristic_values(self, load: float) -> dict[str, float]:
         """Characteristic values of a tyre under one load (N), by name and unit."""
         x, y = self.friction(self.angles, self.slips, load)
         little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
@@ -162,7 +162,7 @@ class Tables(NamedTuple):
     h: np.ndarray
 
 
-class Cells(NamedTuple):
+class TableCell(NamedTuple):
     """Location of a slip angle and a load in the tables: the cells of both, and their relative positions in these
     cells."""
 
@@ -172,7 +172,7 @@ class Cells(NamedTuple):
     load_share: float
 
 
-def stacked(tables: Sequence[TyreTable]) -> Tables:
+def stacked_tables(tables: Sequence[TyreTable]) -> Tables:
     """Tables brought to the union of their nodes, which does not change their interpolated values."""
     if not tables:
         raise InputError("", "tyres", [], "needs at least one table")

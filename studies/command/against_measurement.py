@@ -9,24 +9,24 @@ from typing import Any
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, suggestion
+from models.core.errors import InputError, suggestion_phrase
 from models.core.result import Result, load
 from models.core.whole_files import whole_file
 from models.measured.channel import Channel, Source
 from models.measured.file_kinds import is_measurement
 from models.measured.formats import open_source
-from models.measured.time_shift import ChannelPair, Shift, time_shift
-from models.measured.timing import timing
+from models.measured.time_shift import ChannelPair, TimeShift, time_shift
+from models.measured.timing import sample_timing
 from models.measured.units import factor_between
 from studies.command.comparison import channels_of
 from studies.command.differences import Quantity
 
 TIME_AXIS = "time [s]"
-DOUBTED = 0.5
+DOUBTFUL_CORRELATION = 0.5
 """Correlation below which a time shift is in doubt."""
 SHOWN_CHANNELS = 4
 """Channels in the figure, those of the largest relative error."""
-HEADS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
+TABLE_HEADINGS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,19 @@ class Overlay:
     """Comparison of a measurement with one run: the time shift, the common channels, and notes on what could not be
     compared."""
 
-    shift: Shift
+    shift: TimeShift
     matches: list[Match]
     notes: list[str]
 
     def lines(self) -> list[str]:
         """Lines of the comparison for the screen."""
-        head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
+        head = (
+            f"  {TABLE_HEADINGS[0]:<28} {TABLE_HEADINGS[2]:>11} {'unit':<8} {TABLE_HEADINGS[3]:>9} "
+            f"{TABLE_HEADINGS[4]:>11}  at"
+        )
         rows = [
-            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {_share(each.relative):>9} {each.peak:>11.4g}  "
+            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} "
+            f"{_share_text(each.relative):>9} {each.peak:>11.4g}  "
             f"{each.at:.6g} s{_within_error_text(each)}"
             for each in self.matches
         ]
@@ -105,11 +109,11 @@ class Overlay:
         shift, alike = self.shift.seconds, self.shift.correlation
         if np.isnan(alike):
             return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
-        doubt = "" if alike >= DOUBTED else "; in doubt, as both are hardly alike: name it with --shift"
+        doubt = "" if alike >= DOUBTFUL_CORRELATION else "; in doubt, as both are hardly alike: name it with --shift"
         return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
 
 
-def _share(relative: float) -> str:
+def _share_text(relative: float) -> str:
     """Relative error of a channel as a percentage in text; "-" where it is not finite, as for a constant
     measurement."""
     return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
@@ -119,7 +123,7 @@ def _within_error_text(match: Match) -> str:
     return f"; rms within the run's own error of {match.stated:.2g}" if match.rms <= match.stated else ""
 
 
-def against(run: Path, measurement: Path) -> bool:
+def is_run_against_measurement(run: Path, measurement: Path) -> bool:
     """Whether the two paths are a run (a saved result or a folder) and a file of measurements, in this order."""
     return (
         (run.is_dir() or run.suffix == ".nc")
@@ -129,7 +133,7 @@ def against(run: Path, measurement: Path) -> bool:
     )
 
 
-def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
+def overlay_of_run(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
     """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
@@ -146,15 +150,17 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
     named = {name: channel for channel in source.channels for name in _by_engine(channel.name, engines, ours)}
     if not named:
         theirs = [channel.name for channel in source.channels]
-        name = next((each for each in theirs if suggestion(each, tuple(ours))), theirs[0] if theirs else None)
+        name = next((each for each in theirs if suggestion_phrase(each, tuple(ours))), theirs[0] if theirs else None)
         raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
-    pairs = {name: _pair(source, channel, ours[name]) for name, channel in named.items()}
-    moved_by = time_shift(list(pairs.values())) if shift is None else Shift(shift, np.nan)
-    matches = [_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
+    pairs = {name: _channel_pair(source, channel, ours[name]) for name, channel in named.items()}
+    moved_by = time_shift(list(pairs.values())) if shift is None else TimeShift(shift, np.nan)
+    matches = [_channel_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
     kept = [match for match in matches if match is not None]
     if not kept:
         raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
-    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours, engines)])
+    return Overlay(
+        moved_by, sorted(kept, key=lambda each: -each.relative), [*_missing_channel_notes(source, ours, engines)]
+    )
 
 
 def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
@@ -165,14 +171,16 @@ def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> l
     return [each for each in (f"{name}, {engine}" for engine in engines) if each in ours]
 
 
-def _notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> Iterator[str]:
+def _missing_channel_notes(source: Source, ours: Mapping[str, Quantity], engines: list[str]) -> Iterator[str]:
     """Channels of the file that the run does not have, each with the nearest name."""
     for channel in source.channels:
         if not _by_engine(channel.name, engines, ours):
-            yield f"not compared: {channel.name!r} is no channel of the run{suggestion(channel.name, tuple(ours))}"
+            yield (
+                f"not compared: {channel.name!r} is no channel of the run{suggestion_phrase(channel.name, tuple(ours))}"
+            )
 
 
-def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
+def _channel_pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
     """Times and values of one channel in the run and in the measurement, both in the run's unit."""
     if not channel.unit and ours.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
@@ -180,13 +188,13 @@ def _pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
     factor = factor_between(channel.unit, ours.unit, source.path, channel.name)
     blocks = list(source.blocks([channel.name]))
     times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
-    clock = timing(times, str(source.path), (channel.name,))
+    clock = sample_timing(times, str(source.path), (channel.name,))
     return ChannelPair(
         ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order])
     )
 
 
-def _match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
+def _channel_match(name: str, channel_pair: ChannelPair, unit: str, shift: float, run: Result) -> Match | None:
     """Compare one channel at those measured times that lie within the run; None if no measured time does. The run is
     interpolated by a cubic spline."""
     from scipy.interpolate import CubicSpline
@@ -220,10 +228,10 @@ def saved_results(place: Path) -> dict[str, Result]:
 def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
     """Compare a measurement with a run, or with the runs in a folder; saves ``compare.csv`` and figures, and returns
     the lines to print."""
-    overlays = {name: overlay(run, measurement, shift) for name, run in saved_results(run_path).items()}
+    overlays = {name: overlay_of_run(run, measurement, shift) for name, run in saved_results(run_path).items()}
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(("run", *HEADS))
+        writer.writerow(("run", *TABLE_HEADINGS))
         for name, each in overlays.items():
             for m in each.matches:
                 writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
@@ -251,7 +259,7 @@ def _overlay_lines(name: str, overlay: Overlay, count: int) -> Sequence[str]:
 
 def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
     """Plot the channels with the largest relative errors: measurement and run, and their difference below."""
-    from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
+    from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
     shown = overlay.matches[:SHOWN_CHANNELS]
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
@@ -263,10 +271,10 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
         below.plot(match.times, match.error, color=BLUE)
         below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
         below.set(
-            title=f"rms error {match.rms:.3g} {unit}, {_share(match.relative)} of its deviation",
+            title=f"rms error {match.rms:.3g} {unit}, {_share_text(match.relative)} of its deviation",
             xlabel="time of the run [s]",
         )
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})
+    add_heading(figure, f"{title}: {overlay.told().partition(';')[0]}", {})
     save(figure, path)

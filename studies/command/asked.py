@@ -10,23 +10,23 @@ from pathlib import Path
 from typing import Any, get_args
 
 from models.core.errors import InputError
-from models.core.finding import Finding, lines
-from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, listed, load
+from models.core.finding import Finding, finding_lines
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, load, systems_in_folder
 from models.measured.file_kinds import is_measurement
 
-STUDIES = Path(__file__).parents[1]
-SCENES = STUDIES / "scenes"
-KNOWN_SYSTEMS = SYSTEMS | listed(STUDIES, STUDIES.name)
+STUDIES_FOLDER = Path(__file__).parents[1]
+SCENES_FOLDER = STUDIES_FOLDER / "scenes"
+KNOWN_SYSTEMS = SYSTEMS | systems_in_folder(STUDIES_FOLDER, STUDIES_FOLDER.name)
 """Systems of scenes: those of the models, and studies that have scenes of their own (folders with a ``scene``)."""
 ANY_SYSTEM = "any"
 """System of a study that runs scenes of all systems."""
 
 
 @cache
-def studies() -> tuple[str, ...]:
-    """Names of all studies, read and not imported: files of ``studies`` that have ``run(scene, engines, folder,
+def study_names() -> tuple[str, ...]:
+    """Names of all studies, read and not imported: files of ``study_names`` that have ``run(scene, engines, folder,
     progress)``."""
-    files = sorted(STUDIES.glob("*.py"))
+    files = sorted(STUDIES_FOLDER.glob("*.py"))
     return tuple(file.stem for file in files if re.search(r"^def run\(\s*scene", file.read_text(), re.MULTILINE))
 
 
@@ -37,9 +37,9 @@ def load_scene(name: str, changes: list[str] | None) -> Any:
 
 def scene_path(name: str) -> Path:
     """Path of a scene's file; raises InputError if there is no such scene."""
-    names = tuple(sorted(path.stem for path in SCENES.glob("*.toml")))
+    names = tuple(sorted(path.stem for path in SCENES_FOLDER.glob("*.toml")))
     if name in names:
-        return SCENES / f"{name}.toml"
+        return SCENES_FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and not os.path.lexists(name):
         raise InputError("", "scene", name, "no such scene, and no such file", names)
     if is_measurement(Path(name)):
@@ -66,11 +66,11 @@ def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
     try:
         checked_study(scene, engines)
     except InputError:
-        if not any(_runs(scene, engine) for engine in engines):
+        if not any(_is_runnable(scene, engine) for engine in engines):
             raise
 
 
-def _runs(scene: Any, engine: str) -> bool:
+def _is_runnable(scene: Any, engine: str) -> bool:
     try:
         checked_study(scene, (engine,))
     except InputError:
@@ -93,25 +93,27 @@ def plan_of(scene: Any) -> Any:
 def findings_of(scene: Any) -> tuple[Finding, ...]:
     """Doubts about the input of a scene, before anything is run; raises InputError for impossible input."""
     look = getattr(plan_of(scene), "findings", None)
-    unended = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
+    unended = (
+        () if scene.system == "measured" else _unfinished_file_notes(scene)
+    )  # whose files are remarked on as recordings
     return (*(look(scene) if look else ()), *unended)
 
 
-def causes(scene: Any) -> list[str]:
+def query_lines(scene: Any) -> list[str]:
     """Lines of the queries about a scene's vehicle and channels, which may be why it is refused."""
     from models.core.strict import Query
 
     checks = (*get_args(Query), "exchanged", "shift")
     with suppress(InputError):
-        return lines(finding for finding in findings_of(scene) if finding.check in checks)
+        return finding_lines(finding for finding in findings_of(scene) if finding.check in checks)
     return []
 
 
-def _unended(scene: Any) -> Iterator[Finding]:
+def _unfinished_file_notes(scene: Any) -> Iterator[Finding]:
     """Notes on CSV files of a scene whose last line lacks its line end."""
     from models.core.tables import has_line_end
 
-    for name in dict.fromkeys(_files(scene.table())):
+    for name in dict.fromkeys(_csv_files_of_table(scene.table())):
         try:
             path = scene.path(name)
         except InputError:  # a file that is written, not read
@@ -125,11 +127,11 @@ def _unended(scene: Any) -> Iterator[Finding]:
             )
 
 
-def _files(table: Any) -> Iterator[str]:
+def _csv_files_of_table(table: Any) -> Iterator[str]:
     """Names of CSV files anywhere in nested tables."""
     if isinstance(table, dict | list):
         for value in table.values() if isinstance(table, dict) else table:
-            yield from _files(value)
+            yield from _csv_files_of_table(value)
     elif isinstance(table, str) and table.lower().endswith(".csv"):
         yield table
 
@@ -163,8 +165,8 @@ def study_of(scene: Any) -> Any:
     """The study's module, once the scene's options are known to be its own."""
     from models.core.strict import read
 
-    if scene.study not in studies():
-        raise InputError(scene.file, "study", scene.study, "no such study", studies())
+    if scene.study not in study_names():
+        raise InputError(scene.file, "study", scene.study, "no such study", study_names())
     module = import_module(f"studies.{scene.study}")
     systems = getattr(module, "SYSTEM", DEFAULT_SYSTEM)
     if systems not in (ANY_SYSTEM, scene.system):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from models.core.errors import InputError
 from studies.command.finishing import exit_with_message, folder_of
-from studies.command.waiting import waiting
+from studies.command.waiting import progress_bar
 
 
 def conformity_report(engine: str, more: bool, out: Path | None) -> None:
@@ -26,13 +26,13 @@ def blind_spot_audit(more: bool, only: str | None, out: Path | None, resume: Pat
     report."""
     if more:
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
-    from validation.blind_spots.audit import TRACE, audit, audit_of, summary
+    from validation.blind_spots.audit import TRACE, audit, audit_of, audit_summary
 
     again = "twinrig validate --blind-spots" + ("" if only is None else f" --only '{only}'")
     folder = folder_of("blind-spots", TRACE, "", out, resume)
     try:
-        with waiting("blind spots") as progress:
+        with progress_bar("blind spots") as progress:
             lines = audit(folder, progress) if only is None else audit_of(only, folder, progress)
     except KeyboardInterrupt:
         exit_with_message(f"interrupted; finished functions are kept: {again} --resume {folder}", 130)
-    print("\n".join(summary(lines, folder)))
+    print("\n".join(audit_summary(lines, folder)))

@@ -16,10 +16,10 @@ from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
 from studies.command.differences import Quantity, QuantityDifference
 
-SUFFIXES = (".nc", ".csv")
+RESULT_SUFFIXES = (".nc", ".csv")
 SHOWN_QUANTITIES = 20
 """Quantities that are printed, those that differ most; ``compare.csv`` has them all."""
-KINDS = ("system", "mode")
+KIND_ATTRIBUTES = ("system", "mode")
 """Attributes of a result that must be the same."""
 EQUAL_PLACES = 1e-9
 """Places so near, by the largest of them, are the same."""
@@ -31,20 +31,20 @@ def compare(first: Path, second: Path) -> tuple[list[QuantityDifference], list[s
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
-    pairs, notes = _pairs(first, second)
+    pairs, notes = _file_pairs(first, second)
     differences = list[QuantityDifference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
-        a, b = (dict(_quantities(file)) for file in files)
+        a, b = (dict(_quantities_of_file(file)) for file in files)
         notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
-        differences += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
+        differences += [_quantity_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
     return _by_share(differences, first, second), notes
 
 
 def compare_runs(first: Result, second: Result, names: tuple[str, str]) -> tuple[list[QuantityDifference], list[str]]:
     """Differences between two results in memory; ``names`` are their names in messages and notes."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, second))
-    differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
+    differences = [_quantity_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
 
 
@@ -64,20 +64,20 @@ def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> li
     ]
 
 
-def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
+def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """Pairs of files to compare: the two given files, or files of equal name in both folders; and notes on files
     without a partner."""
     for path in (earlier, later):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
-        if path.is_file() and path.suffix not in SUFFIXES:
+        if path.is_file() and path.suffix not in RESULT_SUFFIXES:
             raise InputError(path, "", None, "is no result: name a folder, a netCDF file (.nc) or a table (.csv)")
     kinds = ["file" if path.is_file() else "folder" for path in (earlier, later)]
     if kinds[0] != kinds[1]:
         raise InputError(later, "", None, f"is a {kinds[1]} and {earlier} a {kinds[0]}: name two of a kind")
     if earlier.is_file():
         return [("", earlier, later)], []
-    first, second = _files(earlier), _files(later)
+    first, second = _result_files(earlier), _result_files(later)
     for folder, files in ((earlier, first), (later, second)):
         if not files:
             raise InputError(folder, "", None, "holds no results (.nc or .csv): name the folder of a run")
@@ -93,20 +93,20 @@ def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], li
     )
 
 
-def _files(folder: Path) -> dict[str, Path]:
+def _result_files(folder: Path) -> dict[str, Path]:
     """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too. If there are
     none, the CSV files."""
     files = [
         path
         for path in sorted(folder.rglob("*"))
-        if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if path.suffix in RESULT_SUFFIXES and not any(part.startswith(".") for part in path.relative_to(folder).parts)
     ]
-    netcdf = [path for path in files if path.suffix == ".nc" and not _tabled(path)]
+    netcdf = [path for path in files if path.suffix == ".nc" and not _holds_same_table(path)]
     chosen = netcdf or [path for path in files if path.suffix == ".csv"]
     return {path.relative_to(folder).as_posix(): path for path in chosen}
 
 
-def _tabled(path: Path) -> bool:
+def _holds_same_table(path: Path) -> bool:
     """Whether a netCDF file and the CSV file of the same name hold the same table: all channels have one common
     axis."""
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
@@ -114,7 +114,7 @@ def _tabled(path: Path) -> bool:
 
 def results_of(first: Path, second: Path) -> dict[str, Result]:
     """Results to compare, by file; for a CSV table beside a netCDF file, the netCDF file is read."""
-    files = [file for _, *pair in _pairs(first, second)[0] for file in pair]
+    files = [file for _, *pair in _file_pairs(first, second)[0] for file in pair]
     results = ((str(file), _result(file)) for file in files)
     return {
         name: run
@@ -129,7 +129,7 @@ def _result(path: Path) -> Result | None:
     return load(beside) if beside.is_file() else None
 
 
-def _quantities(path: Path) -> Iterator[tuple[str, Quantity]]:
+def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
     """Quantities of a file by their names, with the errors that its result states."""
     yield from _with_errors(_result(path), channels_of(load(path).data) if path.suffix == ".nc" else _table(path))
 
@@ -145,12 +145,12 @@ def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]])
 def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
     """Numeric channels of a dataset as quantities over time or another axis. A channel with further axes gives one
     quantity for each entry of these."""
-    kinds = ", ".join(str(data.attrs[kind]) for kind in KINDS if kind in data.attrs)
+    kinds = ", ".join(str(data.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in data.attrs)
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
         along = _dimension_along(channel)
-        over, grid = _grid(channel, along)
+        over, grid = _grid_of_dimension(channel, along)
         others = [dim for dim in channel.dims if dim != along]
         for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
             at = dict(zip(others, place, strict=True))
@@ -167,7 +167,7 @@ def _dimension_along(channel: Any) -> Any:
     return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
-def _grid(channel: Any, along: Any) -> tuple[str, np.ndarray]:
+def _grid_of_dimension(channel: Any, along: Any) -> tuple[str, np.ndarray]:
     """Name and values of the coordinate along a dimension; row numbers if it has none."""
     if along not in channel.coords:
         return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
@@ -206,7 +206,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
+def _quantity_difference(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
     """Difference of one quantity in two results; raises InputError if their kinds, units or rows do not match."""
     if first.kind != second.kind:
         raise InputError(file, name, second.kind, f"the other run is of {first.kind}: compare two runs of one kind")
@@ -233,10 +233,10 @@ def _difference(name: str, first: Quantity, second: Quantity, file: object) -> Q
     if first.over != "time [s]":
         rows = "" if len(first.grid) == len(second.grid) else f", {len(second.grid)} instead of {len(first.grid)}"
         raise InputError(file, name, None, f"has rows at other places ({first.over}) than the first{rows}")
-    return _in_time(name, first, second, file)
+    return _difference_in_time(name, first, second, file)
 
 
-def _in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
+def _difference_in_time(name: str, first: Quantity, second: Quantity, file: object) -> QuantityDifference:
     """Difference of two runs with rows at different times; the denser run is interpolated at the other's rows by a
     cubic spline."""
     from scipy.interpolate import CubicSpline
@@ -279,17 +279,17 @@ def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
             name: [getattr(each, name) for each in differences] for name in ("largest", "rms", "at", "share")
         },
         "within the stated error": [each.name for each in differences if each.within],
-        "table": lines(differences, notes),
+        "table": comparison_lines(differences, notes),
         "results": results,
     }
 
 
-def lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
+def comparison_lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
     """Lines for the screen: the quantities with the largest differences, and the notes."""
-    return [*_lines(differences), *(f"  {note}" for note in notes)]
+    return [*_file_lines(differences), *(f"  {note}" for note in notes)]
 
 
-def _lines(differences: list[QuantityDifference]) -> list[str]:
+def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     differ = [each for each in differences if each.largest > 0.0]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit"]
@@ -325,11 +325,11 @@ def _figure(first: Path, second: Path, differences: list[QuantityDifference], re
         DARK,
         TITLE_TEXT,
         VERMILION,
-        heading,
+        add_heading,
         legend_below,
         save,
         subplots,
-        wrapped,
+        wrapped_text,
     )
 
     differ = [each for each in differences if each.largest != 0][:3]
@@ -339,15 +339,15 @@ def _figure(first: Path, second: Path, differences: list[QuantityDifference], re
     for top, each in zip(axes[0], shown, strict=True):
         top.plot(each.grid, each.first, color=DARK, linewidth=2.0, label=str(first))
         top.plot(each.grid, each.second, color=VERMILION, linewidth=1.0, label=str(second))
-        top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE_TEXT))
+        top.set_title(wrapped_text(f"{each.name} [{each.unit or '-'}]", share, TITLE_TEXT))
     for below, each in zip(axes[-1], differ, strict=False):
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)
         below.plot(each.at, each.gap[each.row], "o", color=BLUE, markersize=5)
         error = ", rms within the stated error" if each.within else ""
         told = f"difference [{each.unit or '-'}], largest {each.largest:.3g} at the mark{error}"
-        below.set_title(wrapped(told, share, TITLE_TEXT))
+        below.set_title(wrapped_text(told, share, TITLE_TEXT))
     for lowest, each in zip(axes[-1], shown, strict=True):
         lowest.set_xlabel(each.over)
     legend_below(figure, axes[0, 0], columns=1)
-    heading(figure, f"Largest differences of {len(differences)} quantities", results)
+    add_heading(figure, f"Largest differences of {len(differences)} quantities", results)
     save(figure, path)

@@ -11,24 +11,24 @@ from models.core.whole_files import write_whole
 from models.engines.export import SUFFIXES, Exported
 
 
-def exported(scene: Any, engine: str) -> Exported:
+def exported_text(scene: Any, engine: str) -> Exported:
     """Text of the exported file, and a list of what it leaves out. Raises InputError for an engine without a file
     format and for a system without an exportable vehicle."""
     if engine not in SUFFIXES:
         raise InputError("--engine", "", engine, "no engine that has files of its own", tuple(SUFFIXES))
-    if scene.system not in _systems():
+    if scene.system not in _exportable_systems():
         allowed = "has no vehicle that an engine builds"
-        raise InputError(scene.file, "system", scene.system, allowed, _systems())
+        raise InputError(scene.file, "system", scene.system, allowed, _exportable_systems())
     answer: Exported = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, engine)
     return answer
 
 
-def _systems() -> tuple[str, ...]:
+def _exportable_systems() -> tuple[str, ...]:
     """Systems whose vehicles can be exported: those with a module ``export``."""
     return tuple(name for name, system in SYSTEMS.items() if find_spec(f"{system.package}.export"))
 
 
-def target(scene: Any, engine: str, output_path: Path | None) -> Path:
+def target_file(scene: Any, engine: str, output_path: Path | None) -> Path:
     """Path of the file to write; raises InputError if it exists, has the wrong extension, or its folder does not
     exist."""
     suffix = SUFFIXES.get(engine, "")
@@ -45,13 +45,13 @@ def target(scene: Any, engine: str, output_path: Path | None) -> Path:
 def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
     """Write the file; returns its path ("file"), and sentences on its contents ("has") and on omissions ("left
     out")."""
-    answer = exported(scene, engine)
-    path = target(scene, engine, output_path)
+    answer = exported_text(scene, engine)
+    path = target_file(scene, engine, output_path)
     write_whole(path, answer.text)
     return {"file": str(path), "has": [*answer.has], "left out": [*answer.left_out]}
 
 
-def lines(title: str, export_record: dict[str, Any]) -> list[str]:
+def export_lines(title: str, export_record: dict[str, Any]) -> list[str]:
     """Lines that the command prints: the scene's title, and the contents and omissions of the exported file."""
     path, left_out = export_record["file"], [f"    {text}" for text in export_record["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from models.core.errors import InputError
-from models.core.finding import Finding, lines, queries
+from models.core.finding import Finding, finding_lines, findings_as_dicts
 from models.core.whole_files import write_whole
-from studies.command.waiting import waiting
+from studies.command.waiting import progress_bar
 
 Work = Callable[[Any], dict[str, Any]]
 """A study, which is given what it tells its progress to, and returns its summary."""
@@ -41,17 +41,17 @@ def finish(
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
     a broken assumption ends with code 1; system : of the scene.
     """
-    from models.core.result_folders import COMMAND, drop_if_empty
-    from models.core.told import summarised
+    from models.core.result_folders import COMMAND_FILE, drop_if_empty
+    from models.core.told import summary_with_errors
 
     try:
-        with waiting(folder.name, system) as progress:
-            summary = summarised(work(progress))
+        with progress_bar(folder.name, system) as progress:
+            summary = summary_with_errors(work(progress))
         if doubts:
-            summary["queries"] = queries(doubts)
+            summary["queries"] = findings_as_dicts(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        kept = {path.name for path in folder.iterdir()} - {COMMAND}
+        kept = {path.name for path in folder.iterdir()} - {COMMAND_FILE}
         exit_with_message(
             f"interrupted; {f'finished results are kept in {folder}' if kept else 'nothing was finished'}", 130
         )
@@ -60,7 +60,7 @@ def finish(
     if as_json:
         print(json.dumps(summary, indent=1))
     else:
-        _print(summary, doubts)
+        _print_summary(summary, doubts)
     if summary.get("failed") or (strict and any(judged["broken"] for judged in summary["assumptions"].values())):
         sys.exit(1)
 
@@ -81,10 +81,10 @@ def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | N
 def untold_findings(findings: tuple[Finding, ...], told: str) -> list[str]:
     """Lines of the findings whose text does not occur in ``told``, which is what a plan or a study has printed
     already."""
-    return lines(finding for finding in findings if finding.text not in told)
+    return finding_lines(finding for finding in findings if finding.text not in told)
 
 
-def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
+def _print_summary(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
     """Print a summary for a human reader."""
     print(summary["scene"])
     for engine, line in summary.get("runs", {}).items():

@@ -15,14 +15,14 @@ from models.ensemble.workers import Crew, places_of
 from models.identification.fit import Fit, fit
 from models.identification.of_scene import problem_of
 from models.identification.problem import Problem
-from models.identification.uncertainty import LikelihoodProfile, Uncertainty, profile, uncertainty
+from models.identification.uncertainty import LikelihoodProfile, Uncertainty, likelihood_profile, uncertainty
 from models.measured.time_shift import ChannelPair, time_shift
 
-STAGES = "stages"
+STAGES_FOLDER = "stages"
 """Folder of finished stages, from which ``--resume`` goes on."""
 NAMED_SHARE = 0.3
 """Share of a combination from which on a parameter is named in it."""
-NEARER = 2.0
+SHIFT_IMPROVEMENT = 2.0
 """Times as near as they are must run and measurement come by a shift of the clock for it to be told."""
 Tell = Callable[[str, float], None]
 
@@ -47,8 +47,8 @@ def identify(
     with Crew.of(scene, usual=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
         if folder is None:
             return uncertainty(fit(problem, None, tell, executor=pool), pool)
-        store = Store(folder / STAGES)
-        with store.claimed(_facts(scene, measurement, problem, engine, low_pass)):
+        store = Store(folder / STAGES_FOLDER)
+        with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
             return uncertainty(fit(problem, store, tell, executor=pool), pool)
 
 
@@ -58,15 +58,19 @@ def profiles_of(
     """Likelihood profiles of all parameters, or only of those that the data do not determine, computed by the scene's
     workers."""
     wanted = [
-        k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.determined[k]
+        k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
     ]
     with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
-        for done, (k, made) in enumerate(in_order(partial(profile, uncertainty), iter(wanted), pool), start=1):
+        for done, (k, made) in enumerate(
+            in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
+        ):
             tell(f"profile of {uncertainty.fit.problem.parameters[k].name}", 0.9 + 0.1 * done / len(wanted))
             yield made
 
 
-def _facts(scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float) -> dict[str, Any]:
+def _facts_of_stages(
+    scene: Any, measurement: str | Path, problem: Problem, engine: str, low_pass: float
+) -> dict[str, Any]:
     """Inputs on which saved stages of an identification depend: if one of them changes, the stages are computed
     anew."""
     table = scene.table()
@@ -95,7 +99,7 @@ def report(
         "folder": str(folder),
         "failed": {},
         "identified": answer,
-        "table": lines(known, drawn),
+        "table": identification_lines(known, drawn),
         "results": {},
     }
 
@@ -112,7 +116,7 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
                 "at a bound": bool(at),
             }
             for name, value, error, sure, at in zip(
-                names, solved.values, uncertainty.deviations, uncertainty.determined, solved.at_bound, strict=True
+                names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.at_bound, strict=True
             )
         },
         "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
@@ -121,12 +125,12 @@ def as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()
             for error, vector in uncertainty.combinations()
         ],
         "condition": _finite_number(uncertainty.condition),
-        "residuals stay alike for [s]": uncertainty.staying,
-        "errors of channels": errors(solved),
+        "residuals stay alike for [s]": uncertainty.correlation_time,
+        "errors of channels": relative_errors(solved),
         "samples left out": {channel.name: channel.left_out for channel in solved.problem.channels},
         "converged": solved.converged,
         "profiles": {
-            each.name: {"values": each.values.tolist(), "rise": each.rise.tolist(), "quadratic": each.quadratic}
+            each.name: {"values": each.values.tolist(), "rise": each.rise.tolist(), "quadratic": each.is_quadratic}
             for each in profiles
         },
     }
@@ -143,7 +147,7 @@ def _finite_number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def errors(fit: Fit) -> dict[str, float]:
+def relative_errors(fit: Fit) -> dict[str, float]:
     """For each channel, ratio of the rms error to the rms of the channel."""
     weights = fit.problem.weights > 0.0
     return {
@@ -152,18 +156,20 @@ def errors(fit: Fit) -> dict[str, float]:
     }
 
 
-def lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> list[str]:
+def identification_lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> list[str]:
     """Lines for the screen."""
     solved = uncertainty.fit
     table = [f"  {'parameter':<32}{'estimate':>13}{'standard error':>16}"]
     for k, each in enumerate(solved.problem.parameters):
         error = "at its bound" if solved.at_bound[k] else f"{uncertainty.deviations[k]:.3g}"
-        doubt = "" if uncertainty.determined[k] else "  not determined by the data"
+        doubt = "" if uncertainty.is_determined[k] else "  not determined by the data"
         table.append(f"  {each.name:<32}{solved.values[k]:>13.6g}{error:>16}{doubt}")
-    table += [f"  error of {name:<23}{100.0 * value:>12.3g} % of its rms" for name, value in errors(solved).items()]
-    table += _combined(uncertainty)
+    table += [
+        f"  error of {name:<23}{100.0 * value:>12.3g} % of its rms" for name, value in relative_errors(solved).items()
+    ]
+    table += _combination_lines(uncertainty)
     table.append(
-        f"  residuals stay alike for {uncertainty.staying:.3g} s; "
+        f"  residuals stay alike for {uncertainty.correlation_time:.3g} s; "
         "standard errors count them so, not as independent samples"
     )
     left = {channel.name: channel.left_out for channel in solved.problem.channels}
@@ -175,29 +181,29 @@ def lines(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) 
             f"  DOUBT: the measurement's clock seems {late:.4g} s later than the run's: take that off its times"
         )
     for curve in profiles:
-        shape = "as the standard error says" if curve.quadratic else "not as the standard error says"
+        shape = "as the standard error says" if curve.is_quadratic else "not as the standard error says"
         at = ", ".join(f"{r:.3g} at {v:.4g}" for v, r in zip(curve.values, curve.rise, strict=True))
         table.append(f"  profile of {curve.name}: {at} (95 % below 3.84), {shape}")
     return table
 
 
 def late_clock(uncertainty: Uncertainty) -> float:
-    """Delay (s) of the measurement relative to the model; 0 unless shifting by it makes the mismatch ``NEARER`` times
-    smaller.
+    """Delay (s) of the measurement relative to the model; 0 unless shifting by it makes the mismatch
+    ``SHIFT_IMPROVEMENT`` times smaller.
 
     The model is that of the start: estimates take up a part of the delay.
     """
     problem, times = uncertainty.fit.problem, uncertainty.fit.problem.clock.times
-    measured = [np.where(channel.used, channel.values, np.nan) for channel in problem.channels]
+    measured = [np.where(channel.is_used, channel.values, np.nan) for channel in problem.channels]
     start = np.array([each.start for each in problem.parameters])
     pairs = [
         ChannelPair(times, row, times, values) for row, values in zip(problem.predicted(start), measured, strict=True)
     ]
     shift = time_shift(pairs).seconds
-    return shift if _distance(pairs, shift) * NEARER < _distance(pairs, 0.0) else 0.0
+    return shift if _mean_distance(pairs, shift) * SHIFT_IMPROVEMENT < _mean_distance(pairs, 0.0) else 0.0
 
 
-def _distance(pairs: Sequence[ChannelPair], shift: float) -> float:
+def _mean_distance(pairs: Sequence[ChannelPair], shift: float) -> float:
     """Mean over channels of rms difference / standard deviation of the measurement, with the measurement shifted
     earlier by a time (s)."""
     shares = []
@@ -209,7 +215,7 @@ def _distance(pairs: Sequence[ChannelPair], shift: float) -> float:
     return float(np.mean(shares))
 
 
-def _combined(uncertainty: Uncertainty) -> list[str]:
+def _combination_lines(uncertainty: Uncertainty) -> list[str]:
     combinations = uncertainty.combinations()
     if not combinations:
         return []
@@ -229,14 +235,14 @@ def _combined(uncertainty: Uncertainty) -> list[str]:
 
 def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
     """Plot every measured channel with the model at the estimates, and the error below it."""
-    from models.drawing.figures import BLUE, DARK, VERMILION, heading, save, subplots
+    from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
     problem = uncertainty.fit.problem
     predicted, times = problem.predicted(uncertainty.fit.values), problem.clock.times
     count = len(problem.channels)
     figure, axes = subplots(2 * count, 1, figsize=(8.0, 2.6 * count + 0.8), sharex=True, squeeze=False)
     for (top, below), channel, row in zip(axes[:, 0].reshape(count, 2), problem.channels, predicted, strict=True):
-        measured = np.where(channel.used, channel.values, np.nan)
+        measured = np.where(channel.is_used, channel.values, np.nan)
         top.plot(times, measured, color=DARK, linewidth=1.2, label="measured")
         top.plot(times, row, color=VERMILION, linewidth=0.8, label="model")
         top.set(title=channel.name, ylabel=f"[{channel.unit or '-'}]")
@@ -244,5 +250,5 @@ def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
         below.set(ylabel=f"model less\nmeasured [{channel.unit or '-'}]")
     axes[-1, 0].set_xlabel("time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    heading(figure, title, {})
+    add_heading(figure, title, {})
     save(figure, path)

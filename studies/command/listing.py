@@ -2,22 +2,22 @@
 
 from importlib import import_module
 
-from models.core.scene_effects import listing
+from models.core.scene_effects import effect_sentences
 from models.core.scene_file import parse
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.scene import parameter_sets
-from studies.command.asked import SCENES
+from studies.command.asked import SCENES_FOLDER
 
 
 def print_lists() -> None:
     """Print all lists, each with its title."""
-    scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES.glob("*.toml"))}
+    scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES_FOLDER.glob("*.toml"))}
     sets = {name: import_module(f"models.vehicles.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)
     for system in SYSTEMS:
         named = "[effects.NAME] in a scene" if system == DEFAULT_SYSTEM else "by the tables of its scenes"
-        _print_list(f"effects of {system} ({named}; one that is not named is not computed)", listing(system))
+        _print_list(f"effects of {system} ({named}; one that is not named is not computed)", effect_sentences(system))
     _print_list("parameter sets (vehicle.parameters = NAME, or a TOML file of your own)", sets)
     _print_list(
         "engines and their integrators (--engine NAME; [engines.NAME] integrator = ...)",

@@ -15,29 +15,29 @@ from typing import Any
 
 SAMPLING_PERIOD = 0.004
 """s between two looks."""
-BEGIN, IMPORTS, KERNELS = "start of Python", "imports", "compiling and loading kernels"
-FIGURES, SAVING, EVERYTHING_ELSE = "figures", "saving", "everything else"
+PYTHON_START_KIND, IMPORTS_KIND, KERNELS_KIND = "start of Python", "imports", "compiling and loading kernels"
+FIGURES_KIND, SAVING_KIND, EVERYTHING_ELSE = "figures", "saving", "everything else"
 BESIDE_ENGINES = "marching beside the engines"
 """A controller, wheels in steps of their own, or equations that belong to no engine."""
-LIBRARIES = {
-    "numba": KERNELS,
-    "llvmlite": KERNELS,
-    "matplotlib": FIGURES,
-    "mpl_toolkits": FIGURES,
-    "PIL": FIGURES,
-    "drawing": FIGURES,
-    "pictures": FIGURES,
-    "h5netcdf": SAVING,
-    "h5py": SAVING,
-    "backends": SAVING,
+KIND_OF_LIBRARY = {
+    "numba": KERNELS_KIND,
+    "llvmlite": KERNELS_KIND,
+    "matplotlib": FIGURES_KIND,
+    "mpl_toolkits": FIGURES_KIND,
+    "PIL": FIGURES_KIND,
+    "drawing": FIGURES_KIND,
+    "pictures": FIGURES_KIND,
+    "h5netcdf": SAVING_KIND,
+    "h5py": SAVING_KIND,
+    "backends": SAVING_KIND,
 }
 """What is done within a library or a folder of ours."""
 ENGINES = ("exudyn", "mujoco", "reference")
-MARCHES = frozenset(
+MARCH_FUNCTIONS = frozenset(
     ("march", "march_adaptively", "solve", "ended", "run", "rollout", "SolveDynamic", "_marched", "_fixed", "_adaptive")
 )
 """Functions in which an engine marches; in all others it is being built, or answers for a single state."""
-FORCES = frozenset(("force", "forces", "law"))
+FORCE_FUNCTIONS = frozenset(("force", "forces", "law"))
 """Functions that an engine asks for forces."""
 
 
@@ -45,7 +45,7 @@ class Watch:
     """Profile of the main thread: seconds spent in each kind of work, from creation of the watch until ``told``."""
 
     def __init__(self) -> None:
-        self.seconds = defaultdict[str, float](float, {BEGIN: time.process_time()})
+        self.seconds = defaultdict[str, float](float, {PYTHON_START_KIND: time.process_time()})
         self._main, self._over = threading.main_thread().ident, threading.Event()
         self._thread = threading.Thread(target=self._sample_stack, daemon=True)
         self._thread.start()
@@ -66,32 +66,32 @@ class Watch:
         self._over.set()
         self._thread.join()
         spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part: -part[1]))
-        return summary | {"profile": spent, "table": [*summary.get("table", []), *lines(spent)]}
+        return summary | {"profile": spent, "table": [*summary.get("table", []), *profile_lines(spent)]}
 
 
 def part_of_run(frame: FrameType) -> str:
     """Kind of work that a call stack is doing, from the innermost call that can be classified."""
     engine, forces = "", False
-    for name, path in _calls(frame):
+    for name, path in _calls_of_stack(frame):
         if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
-            return IMPORTS
+            return IMPORTS_KIND
         for folder in (*path.parts[-4:-1], path.stem):
-            if folder in LIBRARIES:
-                return LIBRARIES[folder]
+            if folder in KIND_OF_LIBRARY:
+                return KIND_OF_LIBRARY[folder]
         if path.stem.endswith(("_figure", "_figures")) or name == "_figure":
-            return FIGURES
+            return FIGURES_KIND
         if (name, path.stem) == ("save", "result") or path.stem == "whole_files":
-            return SAVING
-        forces = forces or name in FORCES
+            return SAVING_KIND
+        forces = forces or name in FORCE_FUNCTIONS
         within = _engine(path)
         engine = engine or within
-        if name in MARCHES and (within or path.stem == "march"):
+        if name in MARCH_FUNCTIONS and (within or path.stem == "march"):
             part = f"marching in {engine}" if engine else BESIDE_ENGINES
             return f"forces asked for by {engine}" if engine and forces else part
     return f"building in {engine}" if engine else EVERYTHING_ELSE
 
 
-def _calls(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
+def _calls_of_stack(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
     """Names and files of the functions of a stack, the innermost first, down to the script itself."""
     while frame is not None and frame.f_globals.get("__name__") != "__main__":
         yield frame.f_code.co_name, PurePath(frame.f_code.co_filename)
@@ -107,7 +107,7 @@ def _engine(path: PurePath) -> str:
     return next(named, "") if path.parent.name == "engines" else ""
 
 
-def lines(spent: dict[str, float]) -> list[str]:
+def profile_lines(spent: dict[str, float]) -> list[str]:
     """Table to print with the seconds and shares of each kind of work, largest first."""
     whole = sum(spent.values())
     rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]

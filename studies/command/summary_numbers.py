@@ -9,7 +9,7 @@ LONGEST_LIST = 8
 """A list of more entries is a curve: of that, the largest magnitude and the rms are taken."""
 SKIPPED_KEYS = ("seconds", "folder", "scene", "table", "failed", "results")
 """What is no answer: how long it took, text, and what the numbers are of."""
-FRAMES = ("answer", "runs", "rows", "channels")
+FRAME_KEYS = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
 Columns = dict[str, list[Any]]
 """Numbers of all points by their names, None where there is none."""
@@ -21,27 +21,27 @@ def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
     Lists of tables are named by the texts with which each table begins, if that tells them apart, or else counted.
     What is not finite is left out.
     """
-    return {name: value for name, value in _scalars("", "", summary) if math.isfinite(value)}
+    return {name: value for name, value in _scalars_of("", "", summary) if math.isfinite(value)}
 
 
-def _scalars(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
+def _scalars_of(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(value, dict):
         unit = f" [{value['unit']}]" if isinstance(value.get("unit"), str) and value["unit"] else unit
         for key, inner in value.items():
             if key not in SKIPPED_KEYS:
-                yield from _scalars(name if key in FRAMES else _joined_name(name, str(key)), unit, inner)
+                yield from _scalars_of(name if key in FRAME_KEYS else _joined_name(name, str(key)), unit, inner)
     elif isinstance(value, list):
-        yield from _list(name, unit, value)
+        yield from _numbers_of_list(name, unit, value)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield name + unit, float(value) if isinstance(value, float) else value
 
 
-def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
+def _numbers_of_list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
     if len(values) > LONGEST_LIST and all(isinstance(value, dict) for value in values):
         columns = {
             key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED_KEYS
         }
-        yield from _scalars(
+        yield from _scalars_of(
             name, unit, {key: numbers for key, numbers in columns.items() if all(map(_is_number, numbers))}
         )
     elif len(values) > LONGEST_LIST:
@@ -58,7 +58,7 @@ def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]
         if len(set(labels)) < len(labels) or not all(labels):
             labels = [str(i + 1) for i in range(len(values))]
         for label, value in zip(labels, values, strict=True):
-            yield from _scalars(_joined_name(name, label), unit, value)
+            yield from _scalars_of(_joined_name(name, label), unit, value)
 
 
 def _is_text(value: Any) -> bool:

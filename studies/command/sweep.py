@@ -2,7 +2,8 @@
 
 ``twinrig run SCENE --sweep vehicle.override.k3=8e4:1.2e5:9`` leaves a folder ``runs/0003`` per point, as the run of
 that scene alone would, and ``sweep.csv``, ``sweep.json`` and figures of every number that its study gives. A sweep is
-an ensemble whose path i is point i: the records of finished points lie in ``points``, and ``--resume`` goes on there.
+an ensemble whose path i is point i: the records of finished points lie in ``sweep_points``, and ``--resume`` goes on
+there.
 """
 
 import csv
@@ -25,19 +26,19 @@ from models.core import told
 from models.core.assumptions import broken_of
 from models.core.discretisation import worst_of
 from models.core.errors import InputError, RunFailed
-from models.core.scene_file import changed
+from models.core.scene_file import changed_tables
 from models.core.whole_files import write_whole
 from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
-from models.ensemble.store import Arrays, code, locked, named_files
+from models.ensemble.store import Arrays, checksum_of_sources, exclusive_folder, named_files
 from models.ensemble.workers import Crew
-from studies.command.asked import STUDIES, checked_study, engines_of, load_scene, scene_path
+from studies.command.asked import STUDIES_FOLDER, checked_study, engines_of, load_scene, scene_path
 from studies.command.summary_numbers import Columns, has_several_values, present_numbers, summary_scalars
 
 if TYPE_CHECKING:
-    from studies.command.sweep_figure import Swept
+    from studies.command.sweep_figure import SweepResults
 
-RECORDS, RUNS = "points", "runs"
+RECORDS_FOLDER, RUNS_FOLDER = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
 MOST_POINTS = 10_000
 """Points of a sweep."""
@@ -62,9 +63,9 @@ class Points:
 
     def __call__(self, paths: range) -> Arrays:
         """``record`` (n,): the record of each point as JSON."""
-        return _array(map(self.record, paths))
+        return _array_of_record(map(self.record, paths))
 
-    def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
+    def prepared_point(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point of the sweep; InputError if the point cannot be run."""
         scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[i])}"])
         scene = scene.model_copy(update={"error": scene.error and self.error})
@@ -78,7 +79,7 @@ class Points:
         first: InputError | None = None
         for i in range(len(self.values)):
             try:
-                return self.ready(i)[0]
+                return self.prepared_point(i)[0]
             except InputError as error:
                 first = first or error
         assert first is not None
@@ -88,19 +89,19 @@ class Points:
         """Record of one point: its numbers by name, the failures (by engine, where the study gives them), and the
         errors and assumptions that its results state."""
         try:
-            scene, engines, study = self.ready(i)
+            scene, engines, study = self.prepared_point(i)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
-            with whole_folder(self.folder / RUNS / f"{i:04d}") as place:
+            with whole_folder(self.folder / RUNS_FOLDER / f"{i:04d}") as place:
                 summary = study.run(scene, engines, place, lambda text, part: None)
         except (InputError, RunFailed) as error:
-            return _failed(error)
-        said = told.attributes(summary.get("results", {}))
+            return _failed_record(error)
+        said = told.attributes_for_json(summary.get("results", {}))
         return {"numbers": summary_scalars(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
         """Everything on which the points depend: the scene as written, the files that it names, and the code."""
         path = scene_path(self.scene)
-        table = changed(path, self.changes)
+        table = changed_tables(path, self.changes)
         return {
             "sweep": self.key,
             "values": list(self.values),
@@ -108,15 +109,15 @@ class Points:
             "error": self.error,
             "scene": table,
             "files": named_files([table, self.values, self.engine], path.parent),
-            "code of studies": code(STUDIES),
+            "code of studies": checksum_of_sources(STUDIES_FOLDER),
         }
 
 
-def _array(records: Iterable[Record]) -> Arrays:
+def _array_of_record(records: Iterable[Record]) -> Arrays:
     return {"record": np.array(list(map(json.dumps, records)))}
 
 
-def _failed(reason: object) -> Record:
+def _failed_record(reason: object) -> Record:
     return {"numbers": {}, "failed": {"": str(reason)}, "results": {}}
 
 
@@ -134,7 +135,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         shutil.rmtree(part, ignore_errors=True)
 
 
-_RANGE = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
+_RANGE_PATTERN = re.compile(r"([^:,]+):([^:,]+):([^:,]+)")
 
 
 def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
@@ -142,10 +143,10 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not key or not rest:
         raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
-    matched = _RANGE.fullmatch(rest)
-    values = _spaced(text, *matched.groups()) if matched else _listed(rest)
+    matched = _RANGE_PATTERN.fullmatch(rest)
+    values = _spaced_values(text, *matched.groups()) if matched else _listed_values(rest)
     for value in values:
-        if not _writable(value):
+        if not _is_writable(value):
             allowed = "must be a finite number, a text, true, false or a list of these"
             raise InputError("--sweep", key, str(value), allowed)
     if not 2 <= len(values) <= MOST_POINTS:
@@ -155,7 +156,7 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
     return key, values
 
 
-def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
+def sweep_points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
     """The job of the sweep in ``text``, without its folder; raises InputError if none of its points can be run."""
     key, values = parse_range(text)
     job = Points(scene, tuple(changes), key, values, engine, Path(), error)
@@ -163,7 +164,7 @@ def points(text: str, scene: str, changes: Sequence[str], engine: str | None, er
     return job
 
 
-def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
+def _spaced_values(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
     """Evenly spaced values; integers if both ends and the spacing are integers."""
     try:
         ends, n = (float(first), float(last)), int(count)
@@ -176,7 +177,7 @@ def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
     return tuple(int(value) for value in values) if whole else tuple(values)
 
 
-def _listed(rest: str) -> tuple[Any, ...]:
+def _listed_values(rest: str) -> tuple[Any, ...]:
     """Values of a list in a scene file's notation; words may lack quotes."""
     try:
         return tuple(tomllib.loads(f"x = [{rest}]")["x"])
@@ -189,7 +190,7 @@ def _value_text(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def _writable(value: Any) -> bool:
+def _is_writable(value: Any) -> bool:
     """Whether a scene file can represent this value exactly."""
     try:
         return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
@@ -201,12 +202,12 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     """All points that are not finished yet, computed by a crew, then table and figures."""
     from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
 
-    with locked(job.folder):
-        for part in (job.folder / RUNS).glob(".*.part"):
+    with exclusive_folder(job.folder):
+        for part in (job.folder / RUNS_FOLDER).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
-        records = _records(job, progress, crew)
+        records = _records_of_points(job, progress, crew)
         swept = _sweep_columns(job, records)
-        _save(job.folder, swept)
+        _save_sweep(job.folder, swept)
         pages = draw_sweep(swept, job.folder)
     reasons = {
         f"{job.key}={value}{f', {who}' if who else ''}": reason
@@ -228,16 +229,16 @@ def run(job: Points, progress: Callable[[str, float], None], crew: Crew) -> dict
     }
 
 
-def _sweep_columns(job: Points, records: list[Record]) -> "Swept":
+def _sweep_columns(job: Points, records: list[Record]) -> "SweepResults":
     """The records of all points as one column per quantity, with the failures and with the errors and assumptions of
     the results."""
-    from studies.command.sweep_figure import Swept
+    from studies.command.sweep_figure import SweepResults
 
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
-    results: list[told.Results] = [told.speaking(record["results"]) for record in records]
-    return Swept(job.scene, job.key, job.values, columns, failures, results, _unit(job))
+    results: list[told.Results] = [told.results_with_attributes(record["results"]) for record in records]
+    return SweepResults(job.scene, job.key, job.values, columns, failures, results, _unit(job))
 
 
 def _unit(job: Points) -> str:
@@ -251,19 +252,19 @@ def _unit(job: Points) -> str:
     return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
-def _records(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
+def _records_of_points(job: Points, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
     """Compute the records of all points; InputError if no point failed and yet none has a number to show."""
 
     def tell(finished: Done) -> None:
         progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
 
     def lost(points: range, reason: str) -> Arrays:
-        return _array(_failed(reason) for _ in points)
+        return _array_of_record(_failed_record(reason) for _ in points)
 
     if crew.cluster is not None:  # whose workers compute in folders of their own
         job = replace(job, folder=job.folder.resolve(), scene=_absolute_path(job.scene))
     with crew.at_work(len(job.values), job.folder, *([Path(job.scene)] if Path(job.scene).is_file() else [])) as pool:
-        kept = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
+        kept = run_paths(job, len(job.values), job.folder / RECORDS_FOLDER, pool, Blocks(1), tell, lost)["record"]
     records = [json.loads(str(text_of_record)) for text_of_record in kept]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
@@ -275,11 +276,11 @@ def _absolute_path(scene: str) -> str:
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
-def _save(folder: Path, swept: "Swept") -> None:
+def _save_sweep(folder: Path, swept: "SweepResults") -> None:
     """Save ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
         [_largest_error(results) for results in swept.results],
-        [_broken(results) for results in swept.results],
+        [_broken_assumptions_text(results) for results in swept.results],
     )
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
@@ -299,7 +300,7 @@ def _largest_error(results: told.Results) -> float | None:
     return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
 
-def _broken(results: told.Results) -> str:
+def _broken_assumptions_text(results: told.Results) -> str:
     """Text on assumptions that a point's results broke, each with the share of the time for which it was broken."""
     breaches = [(name, breach) for name, run in results.items() for breach in broken_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)

@@ -8,41 +8,47 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import broken_of
-from models.core.discretisation import WARNED, worst_of
+from models.core.discretisation import WARNED_SHARE, worst_of
 from models.core.told import Results
 from models.drawing.figures import (
-    BAD,
     COLOURS,
     COLUMN_WIDTH,
     GREY,
     LABELS,
     ORANGE,
-    heading,
+    REJECTED_COLOUR,
+    add_heading,
     legend_below,
     panels,
     save,
-    wrapped,
+    wrapped_text,
 )
 from studies.command.summary_numbers import Columns, has_several_values, present_numbers
 
 PANELS_ACROSS, PANELS_DOWN, MOST_PAGES = 2, 5, 5
 """Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
-DECADES = 30.0
+LOGARITHMIC_RATIO = 30.0
 """Ratio of the largest to the least value from which on an axis is logarithmic."""
-FAILED = {"marker": "x", "color": BAD, "markersize": 8, "markeredgewidth": 2, "label": "failed"}
-BROKEN = {"marker": "o", "color": BAD, "markersize": 9, "markeredgewidth": 1.5, "label": "assumption broken"}
-WARNING = {
+FAILED_MARK = {"marker": "x", "color": REJECTED_COLOUR, "markersize": 8, "markeredgewidth": 2, "label": "failed"}
+BROKEN_MARK = {
+    "marker": "o",
+    "color": REJECTED_COLOUR,
+    "markersize": 9,
+    "markeredgewidth": 1.5,
+    "label": "assumption broken",
+}
+WARNING_MARK = {
     "marker": "^",
     "color": ORANGE,
     "markersize": 8,
     "markeredgewidth": 1.5,
-    "label": f"error above {100.0 * WARNED:g} %",
+    "label": f"error above {100.0 * WARNED_SHARE:g} %",
 }
 """Marks of points, open but for the cross."""
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResults:
     """Results at the points of a sweep of ``scene`` over ``key``.
 
     failures : what failed at each point, by engine; results : of each point, without channels, by their names; unit :
@@ -57,7 +63,7 @@ class Swept:
     results: Sequence[Results]
     unit: str = "SI"
 
-    def broken(self, engine: str) -> list[int]:
+    def broken_points(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
         return [
             i
@@ -65,7 +71,7 @@ class Swept:
             if any(map(broken_of, _results_of_engine(results, engine).values()))
         ]
 
-    def warned(self, engine: str) -> list[int]:
+    def warned_points(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", has an error that is a warning."""
         shown = (map(worst_of, _results_of_engine(results, engine).values()) for results in self.results)
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
@@ -77,19 +83,19 @@ def _results_of_engine(results: Results, engine: str) -> Results:
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
 
 
-def draw_sweep(swept: Swept, folder: Path) -> list[str]:
+def draw_sweep(swept: SweepResults, folder: Path) -> list[str]:
     """Write ``sweep.png``, ``sweep-2.png``, ... and return their names; none where no number changes."""
-    changing = _changing(swept.columns)
+    changing = _changing_quantities(swept.columns)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
     shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
-        _page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
+        _draw_page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
         names.append(name)
     return names
 
 
-def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
+def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     """Quantities that change in the sweep, each with a curve per engine; the engine's name is "" for numbers without
     one."""
     panels: dict[str, dict[str, list[Any]]] = {}
@@ -102,11 +108,11 @@ def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     }
 
 
-def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
+def _draw_page(swept: SweepResults, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
     figure, axes = panels(len(shown), min(PANELS_ACROSS, len(shown)), 2.3)
     at, ticks = _axis_places(swept.values)
     for axis, (what, curves) in zip(axes, shown, strict=True):
-        _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
+        _draw_panel(axis, at, what, curves, swept, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(at, ticks)
         elif _wants_log_axis(at):
@@ -115,7 +121,7 @@ def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Pat
             axis.locator_params(axis="x", nbins=6)
         axis.set_xlabel(swept.key if ticks else f"{swept.key} [{swept.unit}]")
     legend_below(figure, *axes)
-    heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
+    add_heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
     save(figure, path)
 
 
@@ -126,7 +132,9 @@ def _axis_places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
     return np.arange(float(len(values))), [str(value)[:18] for value in values]
 
 
-def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: Swept, style: str) -> None:
+def _draw_panel(
+    axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]], swept: SweepResults, style: str
+) -> None:
     order = np.argsort(at)
     for i, (engine, column) in enumerate(curves.items()):
         axis.plot(
@@ -138,7 +146,7 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
         )
-        _marks(axis, at, np.array(column, float), swept, engine)
+        _draw_marks(axis, at, np.array(column, float), swept, engine)
     if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
         axis.set_yscale("log")
     else:
@@ -146,14 +154,14 @@ def _panel(axis: Any, at: np.ndarray, quantity: str, curves: dict[str, list[Any]
     lost = [i for i, failed in enumerate(swept.failures) if failed and any(col[i] is None for col in curves.values())]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
-        axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED, **foot)
-    axis.set_title(wrapped(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
+        axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
+    axis.set_title(wrapped_text(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
-def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:
+def _draw_marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: SweepResults, engine: str) -> None:
     """Draw open marks around the points of a curve at which a result broke an assumption or has an error that is a
     warning."""
-    for points, look in ((swept.broken(engine), BROKEN), (swept.warned(engine), WARNING)):
+    for points, look in ((swept.broken_points(engine), BROKEN_MARK), (swept.warned_points(engine), WARNING_MARK)):
         shown = [i for i in points if np.isfinite(values[i])]
         if shown:
             axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
@@ -165,4 +173,4 @@ def _with_unit(quantity: str) -> str:
 
 
 def _wants_log_axis(values: np.ndarray) -> bool:
-    return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())
+    return bool(len(values) and (values > 0).all() and values.max() > LOGARITHMIC_RATIO * values.min())

@@ -6,51 +6,60 @@ from functools import partial
 from pathlib import Path
 
 from models.core.errors import InputError
-from models.own_model.certificate import ALIKE, MET, Agreement, certificate, softness, states_of
+from models.own_model.certificate import (
+    CONSTRAINT_GAP,
+    EQUAL_ACCELERATION_SHARE,
+    Agreement,
+    certificate,
+    softness_difference,
+    states_of,
+)
 from models.own_model.control_table import ControlTable, read_controls
-from models.own_model.elements import Element, short
-from models.own_model.explain import Comparison, compare, culprits
+from models.own_model.elements import Element, two_digit_text
+from models.own_model.explain import Comparison, compare, removals_that_agree
 from models.own_model.file import ModelFile, read
 from models.own_model.limits import limits_struck
-from models.own_model.path import PathReport, paths, steps_of_path
-from models.own_model.states import COUNT
+from models.own_model.path import PathReport, compare_paths, steps_of_path
+from models.own_model.states import STATE_COUNT
 from models.own_model.two_paths import PathGap, paths_apart
-from models.own_model.urdf import Misread, misread
+from models.own_model.urdf import Misread, misread_numbers
 
 Tell = Callable[[str, float], None]
 """Told what is done now, and which part of all (0 to 1)."""
 
 
-def _silent(what: str, share: float) -> None:
+def _tell_nobody(what: str, share: float) -> None:
     """Tell nobody."""
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """Options of the command. states: number of random states at which accelerations are compared; paths: whether paths
-    are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints; controls:
-    file of the controls on the paths."""
+class TwinOptions:
+    """Options of the command. states: number of random states at which accelerations are compared; compare_paths:
+    whether paths are compared, too; tolerance (rad, m) and quantity of the price, None for no price and for all joints;
+    controls: file of the controls on the paths."""
 
-    states: int = COUNT
-    paths: bool = True
+    states: int = STATE_COUNT
+    compare_paths: bool = True
     tolerance: float | None = None
     quantity: str | None = None
     controls: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Examined:
-    """Results for one model file: the file as read and how well each build agrees with it. explained: for a build that
-    disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of paths,
-    None if not wanted; price: lines on the cost of accuracy; constraints: lines on dry friction and constraints."""
+class ExaminedFile:
+    """Results for one model file: the file as read and how well each build agrees with it. explanations: for a build
+    that disagrees, the elements that cause it; misread: what MuJoCo's parser changed of a URDF; path: comparison of
+    paths, None if not wanted; price_lines: lines on the cost of accuracy; constraint_lines: lines on dry friction and
+    constraints.
+    """
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
-    explained: dict[str, list[tuple[Element, float]]]
+    explanations: dict[str, list[tuple[Element, float]]]
     misread: tuple[Misread, ...]
     path: PathReport | None
-    price: tuple[str, ...] = ()
-    constraints: tuple[str, ...] = ()
+    price_lines: tuple[str, ...] = ()
+    constraint_lines: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -58,19 +67,19 @@ class Examined:
         return self.file.document.path.name
 
     @property
-    def certified(self) -> bool:
+    def is_certified(self) -> bool:
         """Whether all builds agree with the file, and MuJoCo's parser lost nothing."""
         return all(each.alike for each in self.agreements) and not self.misread
 
 
 @dataclass(frozen=True, eq=False)
 class Twins:
-    """Results of the command for one file or two. comparison: that of the two files; gap: how far their paths are
+    """Results of the command for one file or two. comparison: that of the two files; path_gap: how far their paths are
     apart, None if paths were not wanted or the files have different coordinates."""
 
-    examined: tuple[Examined, ...]
+    examined: tuple[ExaminedFile, ...]
     comparison: Comparison | None
-    gap: PathGap | None = None
+    path_gap: PathGap | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -80,7 +89,7 @@ class Twins:
     @property
     def alike(self) -> bool:
         """Whether all builds agree with their files, and both files with each other."""
-        files = all(each.certified for each in self.examined)
+        files = all(each.is_certified for each in self.examined)
         return files and (self.comparison is None or self.comparison.alike)
 
 
@@ -96,12 +105,12 @@ def check_asked(files: Sequence[Path], page: Path | None) -> None:
         raise InputError("--page", "", str(page), "lies in a folder that does not exist")
 
 
-def kinds(text: str) -> tuple[str, ...]:
+def content_kinds(text: str) -> tuple[str, ...]:
     """The kinds of content that an option lists, separated by commas."""
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
-def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell: Tell = _silent) -> Twins:
+def examine(files: Sequence[Path], without: Sequence[str], wanted: TwinOptions, tell: Tell = _tell_nobody) -> Twins:
     """Certify each file, and compare both if there are two; raises InputError if a file cannot be read or built.
 
     tell : told what is done now, and which part of all.
@@ -110,16 +119,16 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
         raise InputError("--states", "", wanted.states, "must be 1 or more")
     if wanted.quantity is not None and wanted.tolerance is None:
         raise InputError("--quantity", "", wanted.quantity, "is what --tolerance is of: give both, or neither")
-    if wanted.controls and (not wanted.paths or wanted.tolerance is not None or len(files) > 1):
+    if wanted.controls and (not wanted.compare_paths or wanted.tolerance is not None or len(files) > 1):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(wanted.controls), allowed)
     read_files = [read(path, without) for path in files]
-    for file in read_files if wanted.paths else ():
+    for file in read_files if wanted.compare_paths else ():
         steps_of_path(file.twin)
     tables = [read_controls(wanted.controls, file.twin.model) if wanted.controls else None for file in read_files]
     parts = len(files) + (len(files) > 1)
     examined = [
-        _examined(file, table, wanted, partial(_told, tell, i, parts))
+        _examine_file(file, table, wanted, partial(_report_progress, tell, i, parts))
         for i, (file, table) in enumerate(zip(read_files, tables, strict=True))
     ]
     if len(examined) < 2:
@@ -130,41 +139,43 @@ def examine(files: Sequence[Path], without: Sequence[str], wanted: Wanted, tell:
     if names[0] == names[1]:
         names = [str(path) for path in files]
     comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
-    gap = paths_apart(first, second) if wanted.paths and comparison.apart is not None else None
+    gap = paths_apart(first, second) if wanted.compare_paths and comparison.acceleration_agreement is not None else None
     return Twins(tuple(examined), comparison, gap)
 
 
-def _told(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
+def _report_progress(tell: Tell, number: int, parts: int, what: str, share: float) -> None:
     """Report the progress within one file as a share of that of all files."""
     tell(what, (number + share) / parts)
 
 
-def _examined(file: ModelFile, table: ControlTable | None, wanted: Wanted, tell: Tell) -> Examined:
+def _examine_file(file: ModelFile, table: ControlTable | None, wanted: TwinOptions, tell: Tell) -> ExaminedFile:
     """Certify one file, then compare its paths and price its accuracy if wanted. Each of these counts as a third of the
     progress."""
     agreements = certificate(file.twin, wanted.states, lambda share: tell("comparing accelerations", share / 3))
-    explained = {each.build: culprits(file.twin, each.build) for each in agreements if not each.alike}
-    lost = misread(file) if file.document.kind == "URDF" else []
+    explained = {each.build: removals_that_agree(file.twin, each.build) for each in agreements if not each.alike}
+    lost = misread_numbers(file) if file.document.kind == "URDF" else []
     report = None
-    if wanted.paths:
+    if wanted.compare_paths:
         what = f"marching {steps_of_path(file.twin):,} steps by every build"
         tell(what, 1 / 3)
-        report = paths(file.twin, None, table, lambda share: tell(what, (1 + share) / 3))
+        report = compare_paths(file.twin, None, table, lambda share: tell(what, (1 + share) / 3))
     price: tuple[str, ...] = ()
     if wanted.tolerance is not None:
-        from models.advice.own_model_price import priced
-        from models.advice.price.text import lines as price_lines
+        from models.advice.own_model_price import recommended_settings
+        from models.advice.price.text import recommendation_lines as price_lines
 
         tell("pricing", 2 / 3)
-        price = tuple(price_lines(priced(file.twin, wanted.tolerance, wanted.quantity)))
-    return Examined(file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, wanted.states)))
+        price = tuple(price_lines(recommended_settings(file.twin, wanted.tolerance, wanted.quantity)))
+    return ExaminedFile(
+        file, agreements, explained, tuple(lost), report, price, tuple(_constraints(file, wanted.states))
+    )
 
 
 def _constraints(file: ModelFile, count: int) -> Iterator[str]:
     """Lines on joint limits that are exceeded in the test states, on dry friction, and on constraints that are soft in
     MuJoCo, with the difference that the softness makes to accelerations."""
     twin = file.twin
-    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.limited else []
+    beyond = [limits_struck(twin)(q) for q, _ in states_of(twin, count)] if file.ignored_limits else []
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
         yield f"limits of {', '.join(names)} are not built: some would act at {sum(map(bool, beyond))} of the states"
@@ -178,79 +189,81 @@ def _constraints(file: ModelFile, count: int) -> Iterator[str]:
         told = " and ".join(f"{len(rows)} {kind}" for kind, rows in kinds.items() if rows)
         yield (
             f"{told}: rigid in Exudyn and the plain equations, which are held to the file with rigid ones; soft in "
-            f"MuJoCo, where accelerations are {short(softness(twin, count))} away from that"
+            f"MuJoCo, where accelerations are {two_digit_text(softness_difference(twin, count))} away from that"
         )
 
 
-def lines(twins: Twins) -> list[str]:
+def twin_lines(twins: Twins) -> list[str]:
     """Lines for the terminal."""
     rows = list[str]()
     for each in twins.examined:
         rows += _file_lines(each)
     rows += _comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else []
-    return rows + ([twins.gap.line()] if twins.gap is not None else [])
+    return rows + ([twins.path_gap.line()] if twins.path_gap is not None else [])
 
 
-def verdict(each: Examined) -> str:
+def verdict_sentence(each: ExaminedFile) -> str:
     """Sentence with the verdict on a file."""
     worst = max(row.acceleration for row in each.agreements)
     if each.misread:
         return f"MuJoCo's parser made something else of {len(each.misread)} numbers of the file"
-    if each.certified:
+    if each.is_certified:
         bound = max(row.bound for row in each.agreements)
-        said = f"; up to {bound:.0e} may be rounding" if bound > ALIKE else ""
-        return f"every build moves as the file does: accelerations differ by {short(worst)} at the most{said}"
+        said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
+        return f"every build moves as the file does: accelerations differ by {two_digit_text(worst)} at the most{said}"
     builds = ", ".join(row.build for row in each.agreements if not row.alike)
-    return f"differs in {builds}: accelerations by {short(worst)}"
+    return f"differs in {builds}: accelerations by {two_digit_text(worst)}"
 
 
-def _file_lines(each: Examined) -> list[str]:
+def _file_lines(each: ExaminedFile) -> list[str]:
     model, twin = each.file.twin.model, each.file.twin
     rows = [
         f"{each.name}: {each.file.document.kind}, {model.nbody - 1} bodies, {twin.size} coordinates, "
         f"{model.ntendon} tendons, {model.nu} actuators",
-        f"  {verdict(each)}",
+        f"  {verdict_sentence(each)}",
     ]
     for row in each.agreements:
         off = f"  differs most at {row.worst}: {row.difference:.3g} of {row.size:.3g}"
-        apart = f"  its constraints are {short(row.gap)} (m, rad) apart where those of the file meet"
+        apart = f"  its constraints are {two_digit_text(row.gap)} (m, rad) apart where those of the file meet"
         rows.append(
-            f"    {row.build:7s} mass {short(row.mass)}  forces {short(row.force)}  "
-            f"accelerations {short(row.acceleration)}"
-            f"{apart if row.gap > MET else ''}{'' if row.same_motion else off}"
+            f"    {row.build:7s} mass {two_digit_text(row.mass)}  forces {two_digit_text(row.force)}  "
+            f"accelerations {two_digit_text(row.acceleration)}"
+            f"{apart if row.gap > CONSTRAINT_GAP else ''}{'' if row.same_motion else off}"
         )
-    for build, elements in each.explained.items():
+    for build, elements in each.explanations.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
         rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
     rows += [f"  {lost.sentence()}" for lost in each.misread]
     rows += [f"  left out: {content.line()}" for content in each.file.left_out]
-    if each.file.limited:
-        rows.append(f"  limits not built, states drawn inside the ranges: {len(each.file.limited)} joints and tendons")
-    rows += [f"  {note}" for note in (*each.constraints, *each.file.notes)]
+    if each.file.ignored_limits:
+        rows.append(
+            f"  limits not built, states drawn inside the ranges: {len(each.file.ignored_limits)} joints and tendons"
+        )
+    rows += [f"  {note}" for note in (*each.constraint_lines, *each.file.notes)]
     rows += [f"  {line}" for line in each.path.lines()] if each.path is not None else []
-    return rows + [f"  {line}".rstrip() for line in each.price]
+    return rows + [f"  {line}".rstrip() for line in each.price_lines]
 
 
 def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
-    if comparison.apart is None:
+    if comparison.acceleration_agreement is None:
         rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched)]
         return rows + [f"  {each.sentence(names)}" for each in comparison.differences]
-    apart, influential = comparison.apart, comparison.influential
+    apart, influential = comparison.acceleration_agreement, comparison.influential
     head = "both files move alike" if comparison.alike else "the files do not move alike"
     rows = [
-        f"{head}: accelerations differ by {short(apart.acceleration)}, most at {apart.worst}; "
-        f"mass matrices by {short(apart.mass)}"
+        f"{head}: accelerations differ by {two_digit_text(apart.acceleration)}, most at {apart.worst}; "
+        f"mass matrices by {two_digit_text(apart.mass)}"
     ]
     for each in influential:
         size = (
             "cannot be tried"
             if each.influence is None
-            else f"changes accelerations or masses by {short(each.influence)}"
+            else f"changes accelerations or masses by {two_digit_text(each.influence)}"
         )
         rows.append(f"  {each.sentence(names)} ({size})")
     if not comparison.alike:
         rows.append(f"  {comparison.rest()}")
-    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent]
+    rows += [f"  without influence: {each.sentence(names)}" for each in comparison.silent_differences]
     return rows + [
         f"  not compared, since it is off or MuJoCo's alone: {each.sentence(names)}" for each in comparison.not_compared
     ]

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from models.core.waiting import MARCHES
+from models.core.waiting import SHARES_OF_MARCHES
 
 BAR_DELAY, BAR_PERIOD = 1.0, 0.1
 """s until a bar is shown, and between two looks."""
@@ -20,7 +20,7 @@ SLOW_COMPILATION = 0.4
 """s of one compilation from which on it is told: loading what was compiled before takes less."""
 KNOWN_SHARE = 0.01
 """Share of a work from which on its time left is told."""
-COMPILING = {
+COMPILE_SECONDS = {
     "pitch-plane": 5.0,
     "ride": 5.0,
     "wheelset": 15.0,
@@ -30,7 +30,7 @@ COMPILING = {
     "braking": 40.0,
 }
 """s of processor that the kernels of a system's scenes take to compile; an upper bound, as some may be there."""
-LOCK = "numba:compiler_lock"
+COMPILER_LOCK_EVENT = "numba:compiler_lock"
 """Numba's event from the beginning to the end of each compilation."""
 Tell = Callable[[str, float], None]
 """Told what is done now, and which part of all (0 to 1)."""
@@ -50,8 +50,8 @@ class Kernels:
             return
         event: Any = sys.modules["numba.core.event"]
         listener = type("Listener", (event.Listener,), {"on_start": self._start, "on_end": self._end_compilation})()
-        event.register(LOCK, listener)
-        self.attached, self._remove = True, lambda: event.unregister(LOCK, listener)
+        event.register(COMPILER_LOCK_EVENT, listener)
+        self.attached, self._remove = True, lambda: event.unregister(COMPILER_LOCK_EVENT, listener)
 
     def detach(self) -> None:
         """Stop listening to numba's compilation events."""
@@ -71,7 +71,7 @@ class Kernels:
         """Time (s) spent in all compilations so far, the running one included."""
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
-    def busy(self) -> bool:
+    def is_compiling(self) -> bool:
         """Whether a compilation has been running long enough for the progress bar to show it."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW_COMPILATION
 
@@ -86,8 +86,8 @@ class Waiting:
     text: str
     system: str = ""
     share: float = 0.0
-    begun: float = field(default_factory=time.monotonic)
-    kernels: Kernels = field(default_factory=Kernels)
+    start_time: float = field(default_factory=time.monotonic)
+    compilations: Kernels = field(default_factory=Kernels)
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
@@ -96,23 +96,23 @@ class Waiting:
 
     def state(self) -> tuple[str, float | None, str]:
         """Text, finished share and remaining time to show now; the share is None where it is unknown."""
-        if self.kernels.busy():
-            spent, most = self.kernels.spent(), COMPILING.get(self.system, 0.0)
+        if self.compilations.is_compiling():
+            spent, most = self.compilations.spent(), COMPILE_SECONDS.get(self.system, 0.0)
             share = spent / most if most > spent else None
             return "compiling kernels, once", share, _time_left_text(most - spent if share else None, spent)
-        worked = time.monotonic() - self.begun - self.kernels.spent()
-        march = MARCHES[-1] if MARCHES else None
+        worked = time.monotonic() - self.start_time - self.compilations.spent()
+        march = SHARES_OF_MARCHES[-1] if SHARES_OF_MARCHES else None
         if march is None:
-            return self.text, self.share or None, _time_left_text(_remaining(self.share, worked), worked)
+            return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
         if march is not self._march[0]:
             self._march = march, worked
         share, since = 0.0, worked - self._march[1]
         with suppress(Exception):  # an engine that is asked at a bad time
             share = min(max(float(march()), 0.0), 1.0)
-        return self.text, share, _time_left_text(_remaining(share, since), worked)
+        return self.text, share, _time_left_text(_remaining_seconds(share, since), worked)
 
 
-def _remaining(share: float, seconds: float) -> float | None:
+def _remaining_seconds(share: float, seconds: float) -> float | None:
     """Remaining seconds of a task of which ``share`` took ``seconds``; None while the share is too small to tell."""
     return seconds * (1.0 - share) / share if share > KNOWN_SHARE else None
 
@@ -127,7 +127,7 @@ def _duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def waiting(text: str, system: str = "") -> Iterator[Tell]:
+def progress_bar(text: str, system: str = "") -> Iterator[Tell]:
     """Context that shows a progress bar on the terminal if the block takes longer than BAR_DELAY. It yields the
     function to which the block reports its progress.
 
@@ -144,15 +144,15 @@ def waiting(text: str, system: str = "") -> Iterator[Tell]:
     finally:
         over.set()
         thread.join()
-        now.kernels.detach()
+        now.compilations.detach()
 
 
 def _draw(waiting: Waiting, finished: threading.Event) -> None:
     """Draw the bar until the work is over, from BAR_DELAY on."""
     while not finished.wait(BAR_PERIOD):
-        waiting.kernels.attach()
+        waiting.compilations.attach()
         waiting.state()  # which sees when a march begins
-        if time.monotonic() - waiting.begun > BAR_DELAY:
+        if time.monotonic() - waiting.start_time > BAR_DELAY:
             break
     else:
         return
@@ -164,7 +164,7 @@ def _draw(waiting: Waiting, finished: threading.Event) -> None:
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
         task = bar.add_task(waiting.text, total=None, left="")
         while True:
-            waiting.kernels.attach()
+            waiting.compilations.attach()
             text, share, left = waiting.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)

@@ -12,13 +12,13 @@ import numpy as np
 from models.machine.compiled import njit
 from studies.pictures.shapes import PaintedSurface
 
-NEAREST = 0.05
+NEAREST_DRAWN = 0.05
 """m: what is nearer to the eye, or behind it, is not drawn."""
 LIGHT_DIRECTION = np.array([0.35, 0.5, 0.8])
 """Towards the lamp: to the spectator's right, back to him, up."""
-HAZE = 70.0
+HAZE_DISTANCE = 70.0
 """m: how far one sees until the sky's lower colour hides two thirds."""
-DIM = 0.4
+SHADED_BRIGHTNESS = 0.4
 """Brightness of a surface that looks away from the lamp."""
 
 
@@ -52,7 +52,7 @@ class Camera:
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
         return height / 2.0 * (1.0 - level / np.tan(self.opening / 2.0))
 
-    def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) at which points (..., 3) appear, and their inverse distances (...) along the line of sight;
         the inverse distance of a point behind the camera is negative."""
         seen = (points - self.eye) @ self.axes.T
@@ -61,7 +61,9 @@ class Camera:
         return np.stack([width / 2.0 + scale * seen[..., 0], height / 2.0 - scale * seen[..., 1]], -1), near
 
 
-def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
+def painted_picture(
+    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky: np.ndarray
+) -> np.ndarray:
     """Image (h, w, 3) of surfaces in front of a sky, with the sky's two colours at the picture's top and at the
     horizon.
 
@@ -74,31 +76,31 @@ def picture(camera: Camera, layers: list[list[PaintedSurface]], width: int, heig
         nearest = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(*_shaded(camera, solid, width, height, sky[1]), image, nearest)
+            paint(*_shaded_triangles(camera, solid, width, height, sky[1]), image, nearest)
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), nearest.copy()
-            paint(*_shaded(camera, [surface], width, height, sky[1]), veil, front)
+            paint(*_shaded_triangles(camera, [surface], width, height, sky[1]), veil, front)
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
 
-def _shaded(
+def _shaded_triangles(
     camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners, depths and colours, for ``paint``, of the triangles in front of the camera."""
-    corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
+    corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
     colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)
-    kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
+    kept = ((near > 0.0) & (near < 1.0 / NEAREST_DRAWN)).all(axis=1)
     towards = LIGHT_DIRECTION @ camera.axes / np.linalg.norm(LIGHT_DIRECTION)
-    light = DIM + (1.0 - DIM) * (0.5 + 0.5 * normals[kept] @ towards)
-    clear = np.exp(-1.0 / (HAZE * near[kept]))[..., None]
+    light = SHADED_BRIGHTNESS + (1.0 - SHADED_BRIGHTNESS) * (0.5 + 0.5 * normals[kept] @ towards)
+    clear = np.exp(-1.0 / (HAZE_DISTANCE * near[kept]))[..., None]
     return corners[kept], near[kept], clear * light[..., None] * colours[kept, None] + (1.0 - clear) * haze
 
 
 @njit(cache=True, error_model="numpy")
-def within(start, growth, left, right):
+def columns_within(start, growth, left, right):
     """First and last column between ``left`` and ``right`` for which start + column * growth is not negative; the first
     is greater than the last where there is no such column."""
     if growth > 0.0:
@@ -129,9 +131,9 @@ def paint(corners, near, colours, image, nearest):
             # Shares of corners 1 and 2 at column 0, and their growth from column to column.
             first, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
             two, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
-            left, right = within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
-            left, right = within(two, two_on, left, right)
-            left, right = within(1.0 - first - two, -one_on - two_on, left, right)
+            left, right = columns_within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
+            left, right = columns_within(two, two_on, left, right)
+            left, right = columns_within(1.0 - first - two, -one_on - two_on, left, right)
             for column in range(math.ceil(left), math.floor(right) + 1):
                 b, c = first + column * one_on, two + column * two_on
                 a = 1.0 - b - c

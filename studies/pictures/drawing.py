@@ -3,20 +3,20 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from studies.pictures.camera import picture
+from studies.pictures.camera import painted_picture
 from studies.pictures.film import FilmedMotion, Stage
 from studies.pictures.shapes import arrow, rod
 
-SKY = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
+SKY_COLOURS = np.array([[0.80, 0.87, 0.94], [0.985, 0.99, 1.0]])
 """Colour at the top of a picture and at the horizon."""
-THICKNESS = 0.024
+ARROW_HALF_WIDTH = 0.024
 """Half width of an arrow's head, by the height that the picture shows at its target."""
-GREY = (0.35, 0.37, 0.4)
+GREY_COLOUR = (0.35, 0.37, 0.4)
 
 
 def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: int) -> np.ndarray:
     """Image (height, width, 3), colours from 0 to 1, of frame ``k``."""
-    poses = {name: pose(motion, stage, name, k) for name in stage.shapes}
+    poses = {name: drawn_pose(motion, stage, name, k) for name in stage.shapes}
     bodies = [surface.moved(*poses[name]) for name, shapes in stage.shapes.items() for surface in shapes]
     around = stage.scenery(float(motion.times[k]))
 
@@ -25,41 +25,42 @@ def draw_frame(motion: FilmedMotion, stage: Stage, k: int, width: int, height: i
         return place + turn @ np.array(point)
 
     struts = [
-        rod(end(s.first_body, s.first_point), end(s.second_body, s.second_point), 0.025, GREY) for s in stage.struts
+        rod(end(s.first_body, s.first_point), end(s.second_body, s.second_point), 0.025, GREY_COLOUR)
+        for s in stage.struts
     ]
-    thick = THICKNESS * height / stage.camera.pixels(height)
+    thick = ARROW_HALF_WIDTH * height / stage.camera.pixels(height)
     arrows = [
-        arrow(*line, thick, stage.kinds[force.kind].colour)
-        for force, line in zip(motion.arrows, lines(motion, stage, k), strict=True)
+        arrow(*line, thick, stage.arrow_styles[force.kind].colour)
+        for force, line in zip(motion.arrows, arrow_lines(motion, stage, k), strict=True)
     ]
     seen = [surface for surface in arrows if surface]
-    return picture(stage.camera, [around + struts + bodies, seen], width, height, SKY)
+    return painted_picture(stage.camera, [around + struts + bodies, seen], width, height, SKY_COLOURS)
 
 
-def lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def arrow_lines(motion: FilmedMotion, stage: Stage, k: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each arrow of frame ``k``, its start and its vector (3,), in m of the picture."""
     spans = []
     for force in motion.arrows:
-        place, turn = pose(motion, stage, force.body, k)
-        on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.places[force.body][k])
-        spans.append((place + turn @ on_body, stage.kinds[force.kind].scale * force.vectors[k]))
+        place, turn = drawn_pose(motion, stage, force.body, k)
+        on_body = motion.turns[force.body][k].T @ (force.points[k] - motion.positions[force.body][k])
+        spans.append((place + turn @ on_body, stage.arrow_styles[force.kind].scale * force.vectors[k]))
     return spans
 
 
-def pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
+def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Position (3,) and rotation (3, 3) with which a body is drawn in frame ``k``. Its displacement and rotation from
     rest are magnified, except for a wheel's spin."""
-    rest = np.array(stage.rest[body])
-    place, turn = rest + stage.magnified * (motion.places[body][k] - rest), motion.turns[body][k]
+    rest = np.array(stage.rest_positions[body])
+    place, turn = rest + stage.magnification * (motion.positions[body][k] - rest), motion.turns[body][k]
     if body in stage.wheels:
         # the smallest rotation that takes the y axis to the axle
         axis = np.cross([0.0, 1.0, 0.0], turn[:, 1])
         sine = float(np.linalg.norm(axis))
         angle = np.arctan2(sine, turn[1, 1])
         lean = Rotation.from_rotvec(axis * (angle / sine if sine > 0 else 0.0))
-        return place, _magnified(lean, stage.magnified) @ lean.as_matrix().T @ turn
-    return place, _magnified(Rotation.from_matrix(turn), stage.magnified)
+        return place, _magnified_turn(lean, stage.magnification) @ lean.as_matrix().T @ turn
+    return place, _magnified_turn(Rotation.from_matrix(turn), stage.magnification)
 
 
-def _magnified(turn: Rotation, times: float) -> np.ndarray:
+def _magnified_turn(turn: Rotation, times: float) -> np.ndarray:
     return Rotation.from_rotvec(times * turn.as_rotvec()).as_matrix()

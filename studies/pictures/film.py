@@ -36,14 +36,14 @@ class FilmedMotion:
 
     engine: str
     times: np.ndarray
-    places: dict[str, np.ndarray]
+    positions: dict[str, np.ndarray]
     turns: dict[str, np.ndarray]
     arrows: tuple[Arrow, ...] = ()
     run: Result | None = None
 
 
 @dataclass(frozen=True)
-class Kind:
+class ArrowStyle:
     """How arrows of one kind look: colour, metres per newton, and a round force (N) for the legend."""
 
     colour: Colour
@@ -74,28 +74,29 @@ class Strut:
 class Stage:
     """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
-    shapes : surfaces of each body in its own axes; rest : its place when nothing moves; magnified : how many times as
-    large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is drawn as it
-    is); kinds : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in space.
+    shapes : surfaces of each body in its own axes; rest_positions : its place when nothing moves; magnification : how
+    many times as large displacements and turns from there are drawn (turning about the y of ``wheels`` apart, which is
+    drawn as it is); arrow_styles : of the arrows; curve : plotted below; scenery : surfaces around at a time (s), in
+    space.
     """
 
     title: str
     caption: str
     shapes: dict[str, list[PaintedSurface]]
-    rest: Mapping[str, ArrayLike]
+    rest_positions: Mapping[str, ArrayLike]
     camera: Camera
-    kinds: dict[str, Kind]
+    arrow_styles: dict[str, ArrowStyle]
     curve: ForceCurve
     scenery: Callable[[float], list[PaintedSurface]] = lambda time: []
-    magnified: float = 1.0
+    magnification: float = 1.0
     wheels: tuple[str, ...] = ()
     struts: tuple[Strut, ...] = ()
 
 
-def gaps(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
+def largest_differences(first: FilmedMotion, second: FilmedMotion) -> tuple[float, float, float]:
     """Largest differences between two filmed motions: of positions (m), of elements of the rotation matrices, and of
     forces (N)."""
-    places = [(place, second.places[name]) for name, place in first.places.items()]
+    places = [(place, second.positions[name]) for name, place in first.positions.items()]
     turns = [(turn, second.turns[name]) for name, turn in first.turns.items()]
     forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, second.arrows, strict=True)]
     largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))
@@ -115,7 +116,7 @@ def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) ->
     for data.qpos[:] in coordinates:
         mujoco.mj_kinematics(model, data)
         frames.append([(data.xpos[i].copy(), data.xmat[i].copy()) for i in bodies.values()])
-    return _poses(frames, bodies)
+    return _poses_of_frames(frames, bodies)
 
 
 def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
@@ -127,10 +128,10 @@ def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates:
     for row in coordinates:
         mbs.systemData.SetODE2Coordinates(row)
         frames.append([(ask(kinds.Position), ask(kinds.RotationMatrix)) for ask in bodies.values()])
-    return _poses(frames, bodies)
+    return _poses_of_frames(frames, bodies)
 
 
-def _poses(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
+def _poses_of_frames(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
     """Position and rotation of every body over all frames."""
     by_body = {
         name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)

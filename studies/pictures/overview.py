@@ -21,14 +21,14 @@ from models.drawing.figures import (
     LABELS,
     PALE,
     SMALL_TEXT,
-    heading,
+    add_heading,
     save,
     subplot_mosaic,
 )
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
 
-DURATION, FORCE = 2.0, "f1"
+DURATION, COMPARED_FORCE = 2.0, "f1"
 """Length of a run (s), and the front wheel's force, which is compared."""
 SCENE: dict[str, Any] = {
     "title": "A vehicle on a rough road",
@@ -36,10 +36,10 @@ SCENE: dict[str, Any] = {
     "run": {"duration": DURATION},
     "effects": {"road": {"source": "iso8608", "road_class": "B", "level": "one-sided", "seed": 1, "speed": 20.0}},
 }
-STEPS = (1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)
-STABLE = {"exudyn": STEPS, "mujoco": STEPS[2:], "reference": STEPS[2:]}
-"""Steps, s, which all divide ``GRID``; and of each curve those at which its method is stable."""
-GRID, REFERENCE_STEP = 1e-2, 5e-5
+STEPS_TRIED = (1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)
+STABLE_STEPS = {"exudyn": STEPS_TRIED, "mujoco": STEPS_TRIED[2:], "reference": STEPS_TRIED[2:]}
+"""Steps, s, which all divide ``COMPARISON_SPACING``; and of each curve those at which its method is stable."""
+COMPARISON_SPACING, REFERENCE_STEP = 1e-2, 5e-5
 """s: spacing of the times at which forces are compared, and step of what is taken for the truth."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
 ENGINE_DEFAULTS = {"exudyn": ("GeneralizedAlpha", "usual solver", 1e-2), "mujoco": ("Euler", "usual solver", 2e-3)}
@@ -56,9 +56,9 @@ def draw(path: Path) -> Path:
     )
     _draw_overview(axes["idea"])
     _forces(axes["force"], alike)
-    _gaps(axes["gap"], alike)
-    _prices(axes["price"])
-    heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
+    _plot_differences(axes["gap"], alike)
+    _plot_prices(axes["price"])
+    add_heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
     return save(figure, path)
 
 
@@ -72,18 +72,23 @@ def _forces(axis: Any, runs: dict[str, Result]) -> None:
     for engine, result in runs.items():
         line, width = CURVE_STYLES[engine]
         axis.plot(
-            result.times, 1e-3 * result[FORCE], line, color=COLOURS[engine], linewidth=width, label=LABELS[engine]
+            result.times,
+            1e-3 * result[COMPARED_FORCE],
+            line,
+            color=COLOURS[engine],
+            linewidth=width,
+            label=LABELS[engine],
         )
     axis.set(xlabel="time [s]", title="The same force [kN] ...", xlim=(0.0, DURATION))
 
 
-def _gaps(axis: Any, runs: dict[str, Result]) -> None:
+def _plot_differences(axis: Any, runs: dict[str, Result]) -> None:
     """Plot the largest difference of each engine's force from the reference up to each time, divided by the largest
     force."""
     reference = runs["reference"]
-    largest = np.abs(reference[FORCE]).max()
+    largest = np.abs(reference[COMPARED_FORCE]).max()
     for engine in ("exudyn", "mujoco"):
-        gap = np.maximum.accumulate(np.abs(runs[engine][FORCE] - reference[FORCE])) / largest
+        gap = np.maximum.accumulate(np.abs(runs[engine][COMPARED_FORCE] - reference[COMPARED_FORCE])) / largest
         axis.semilogy(reference.times, np.maximum(gap, 1e-18), color=COLOURS[engine], linewidth=1.6)
     digits = math.floor(-math.log10(max(line.get_ydata()[-1] for line in axis.lines)))
     axis.axhline(1e-2, color=DARK, linestyle=":")
@@ -93,28 +98,31 @@ def _gaps(axis: Any, runs: dict[str, Result]) -> None:
     )
 
 
-def _prices(axis: Any) -> None:
+def _plot_prices(axis: Any) -> None:
     """Plot the relative error of the force over the number of force calls, for the classical Runge-Kutta method and for
     each engine's usual solver."""
     truth = _run("reference", "RK4", REFERENCE_STEP)
     curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
     for engine, (method, name) in curves.items():
-        points = [_price(_run(engine, method, step), truth, step) for step in STABLE[engine]]
+        points = [_calls_and_error(_run(engine, method, step), truth, step) for step in STABLE_STEPS[engine]]
         calls, errors = zip(*points, strict=True)
         axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
         axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL_TEXT)
     for engine, (method, _, step) in ENGINE_DEFAULTS.items():
-        place = _price(_run(engine, method, step), truth, step)
+        place = _calls_and_error(_run(engine, method, step), truth, step)
         axis.plot(*place, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
 
 
-def _price(result: Result, truth: Result, step: float) -> tuple[float, float]:
+def _calls_and_error(result: Result, truth: Result, step: float) -> tuple[float, float]:
     """Number of force calls of a run, and the largest error of its force at common times, divided by the largest
     force."""
-    rows, fine = round(GRID / step), round(GRID / REFERENCE_STEP)
-    error = np.abs(result[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
+    rows, fine = round(COMPARISON_SPACING / step), round(COMPARISON_SPACING / REFERENCE_STEP)
+    error = (
+        np.abs(result[COMPARED_FORCE][::rows] - truth[COMPARED_FORCE][::fine]).max()
+        / np.abs(truth[COMPARED_FORCE]).max()
+    )
     return float(result.counts()["force calls"]), float(error)
 
 
@@ -135,17 +143,17 @@ def _draw_overview(axis: Any) -> None:
     axis.text(4.1, 2.85, "one scene file", ha="center", va="center", fontsize=9)
     for engine, height in (("exudyn", 3.45), ("mujoco", 2.1), ("reference", 0.75)):
         name = LABELS[engine] if engine != "reference" else "equations by hand"
-        _arrow(axis, (8.4, 2.1), (10.3, height), COLOURS[engine])
-        _box(axis, (13.2, height), 5.6, name, COLOURS[engine])
-        _arrow(axis, (16.1, height), (17.5, 2.1), COLOURS[engine])
-    _box(axis, (20.7, 2.1), 6.0, "one result: compared,\nits error and its price", DARK, 1.7)
+        _draw_arrow(axis, (8.4, 2.1), (10.3, height), COLOURS[engine])
+        _draw_box(axis, (13.2, height), 5.6, name, COLOURS[engine])
+        _draw_arrow(axis, (16.1, height), (17.5, 2.1), COLOURS[engine])
+    _draw_box(axis, (20.7, 2.1), 6.0, "one result: compared,\nits error and its price", DARK, 1.7)
 
 
-def _arrow(axis: Any, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
+def _draw_arrow(axis: Any, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
     axis.add_patch(FancyArrowPatch(start, end, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4))
 
 
-def _box(axis: Any, middle: tuple[float, float], wide: float, text: str, colour: str, high: float = 0.95) -> None:
+def _draw_box(axis: Any, middle: tuple[float, float], wide: float, text: str, colour: str, high: float = 0.95) -> None:
     corner = middle[0] - wide / 2, middle[1] - high / 2
     shape = FancyBboxPatch(corner, wide, high, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour)
     axis.add_patch(shape)

@@ -14,14 +14,14 @@ from matplotlib.transforms import IdentityTransform
 
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY
 from studies.pictures.drawing import draw_frame
-from studies.pictures.film import FilmedMotion, Stage, gaps
+from studies.pictures.film import FilmedMotion, Stage, largest_differences
 
-WIDTH, HEIGHT = 1280, 720
-EDGE, TOP, TALL = 12, 66, 400
+PAGE_WIDTH, PAGE_HEIGHT = 1280, 720
+PAGE_MARGIN, TITLE_HEIGHT, PICTURE_HEIGHT = 12, 66, 400
 """Pixels: margin, height of the title, height of the pictures."""
 
 
-LETTERS: dict[Any, Any] = {
+FONT_SIZES: dict[Any, Any] = {
     "font.size": 11.5,
     **dict.fromkeys(("axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 11.5),
     "axes.titlesize": 12.5,
@@ -34,13 +34,13 @@ class Page:
 
     def __init__(self, stage: Stage, motions: list[FilmedMotion]) -> None:
         self.stage, self.motions = stage, motions
-        self._wide = (WIDTH - EDGE * (len(motions) + 1)) // len(motions)
-        self._lefts = [EDGE + i * (self._wide + EDGE) for i in range(len(motions))]
+        self._wide = (PAGE_WIDTH - PAGE_MARGIN * (len(motions) + 1)) // len(motions)
+        self._lefts = [PAGE_MARGIN + i * (self._wide + PAGE_MARGIN) for i in range(len(motions))]
         self._forces = [
             [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
             for motion in motions
         ]
-        with rc_context(LETTERS):
+        with rc_context(FONT_SIZES):
             self._draw()
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
@@ -48,15 +48,17 @@ class Page:
         """Draw everything that is the same in all frames."""
         stage, motions = self.stage, self.motions
         no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
-        self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout=no_layout)
+        self._figure = Figure(figsize=(PAGE_WIDTH / 100, PAGE_HEIGHT / 100), dpi=100, layout=no_layout)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._figure.text(EDGE / WIDTH, 0.96, stage.title, fontsize=15, weight="bold")
+        self._figure.text(PAGE_MARGIN / PAGE_WIDTH, 0.96, stage.title, fontsize=15, weight="bold")
         for left, motion in zip(self._lefts, motions, strict=True):
             style: Any = {"fontsize": 12, "weight": "bold", "color": COLOURS[motion.engine], "va": "bottom"}
-            self._figure.text(left / WIDTH, 1 - (TOP - 5) / HEIGHT, LABELS[motion.engine], **style)
-        self._legend()
-        axes = self._curves()
-        self._clock = self._figure.text(1 - EDGE / WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace")
+            self._figure.text(left / PAGE_WIDTH, 1 - (TITLE_HEIGHT - 5) / PAGE_HEIGHT, LABELS[motion.engine], **style)
+        self._draw_legend()
+        axes = self._draw_curves()
+        self._clock = self._figure.text(
+            1 - PAGE_MARGIN / PAGE_WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace"
+        )
         self._cursor = axes.axvline(0.0, color=DARK, lw=1.2)
         for artist in (self._clock, self._cursor):
             artist.set_animated(True)
@@ -76,23 +78,23 @@ class Page:
             self._figure.draw_artist(artist)
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         for left, motion in zip(self._lefts, self.motions, strict=True):
-            image = draw_frame(motion, self.stage, k, self._wide, TALL)
-            page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(image)
+            image = draw_frame(motion, self.stage, k, self._wide, PICTURE_HEIGHT)
+            page[TITLE_HEIGHT : TITLE_HEIGHT + PICTURE_HEIGHT, left : left + self._wide] = eight_bits(image)
         return page
 
-    def tallest(self) -> int:
+    def frame_of_largest_force(self) -> int:
         """Number of the frame in which the plotted forces are largest."""
         return int(np.abs(np.column_stack(self._forces[0])).sum(axis=1).argmax())
 
-    def _legend(self) -> None:
+    def _draw_legend(self) -> None:
         """Draw the legend: an arrow for each kind of force with the length that its legend force (N) has at the
         camera's target, and the stage's caption."""
-        row, left = 1 - (TOP + TALL + 20) / HEIGHT, float(EDGE)
-        for name, kind in self.stage.kinds.items():
-            length = kind.scale * kind.legend * self.stage.camera.pixels(TALL)
+        row, left = 1 - (TITLE_HEIGHT + PICTURE_HEIGHT + 20) / PAGE_HEIGHT, float(PAGE_MARGIN)
+        for name, kind in self.stage.arrow_styles.items():
+            length = kind.scale * kind.legend * self.stage.camera.pixels(PICTURE_HEIGHT)
             arrow = FancyArrow(
                 left,
-                row * HEIGHT,
+                row * PAGE_HEIGHT,
                 length,
                 0.0,
                 width=3.5,
@@ -104,20 +106,22 @@ class Page:
                 transform=IdentityTransform(),
             )
             self._figure.add_artist(arrow)
-            text = self._figure.text((left + length + 8) / WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center")
+            text = self._figure.text(
+                (left + length + 8) / PAGE_WIDTH, row, f"{name}, {kind.legend / 1e3:g} kN", va="center"
+            )
             left += length + 8 + text.get_window_extent().width + 34
-        self._figure.text(1 - EDGE / WIDTH, row, self.stage.caption, ha="right", va="center")
+        self._figure.text(1 - PAGE_MARGIN / PAGE_WIDTH, row, self.stage.caption, ha="right", va="center")
 
-    def _curves(self) -> Axes:
+    def _draw_curves(self) -> Axes:
         """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others."""
-        axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 128 / HEIGHT))
+        axes = self._figure.add_axes((70 / PAGE_WIDTH, 62 / PAGE_HEIGHT, 1 - 82 / PAGE_WIDTH, 128 / PAGE_HEIGHT))
         first, curve = self.motions[0], self.stage.curve
         names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
         times, every = first.times, max(1, len(first.times) // 60)
-        for name, values, tone in zip(names, self._forces[0], cycle(TONES)):
+        for name, values, tone in zip(names, self._forces[0], cycle(CURVE_COLOURS)):
             axes.plot(times, values, color=tone, label=name)
         for forces in self._forces[1:]:
-            for values, tone in zip(forces, cycle(TONES)):
+            for values, tone in zip(forces, cycle(CURVE_COLOURS)):
                 axes.plot(times[::every], values[::every], "o", ms=3, color=tone)
         axes.set_xlim(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
         axes.set_ylabel(f"{curve.kind} [kN]")
@@ -125,21 +129,21 @@ class Page:
         labels = (LABELS[motion.engine] for motion in self.motions)
         axes.set_title(f"{curve.kind.capitalize()} {curve.meaning}" + marks.format(*labels))
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
-        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, difference(self.motions), ha="right")
-        self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]")
+        self._figure.text(1 - PAGE_MARGIN / PAGE_WIDTH, 12 / PAGE_HEIGHT, difference_sentence(self.motions), ha="right")
+        self._figure.text(70 / PAGE_WIDTH, 12 / PAGE_HEIGHT, "time [s]")
         return axes
 
 
-TONES = (DARK, PINK, ORANGE, SKY, GREY)
+CURVE_COLOURS = (DARK, PINK, ORANGE, SKY, GREY)
 """Colours of curves, none of them that of an engine, which stands above its picture."""
 
 
-def difference(motions: list[FilmedMotion]) -> str:
+def difference_sentence(motions: list[FilmedMotion]) -> str:
     """Sentence on the largest differences between two engines over the film; with a single engine, on which engine it
     is."""
     if len(motions) == 1:
         return f"poses as {LABELS[motions[0].engine]} reports them"
-    places, turns, forces = gaps(*motions)
+    places, turns, forces = largest_differences(*motions)
     return (
         "poses as each engine reports them; largest difference over the film: "
         f"places {places:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"

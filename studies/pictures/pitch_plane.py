@@ -7,22 +7,25 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from models.engines.protocol import build
-from models.systems.pitch_plane.run import Channels, outputs
-from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.run import Channels, output_channels
+from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, Strut, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, Strut, of_exudyn, of_mujoco
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
-from studies.pictures.shapes import PAINT, PaintedSurface, box, tyred_wheel
+from studies.pictures.shapes import PAINT_COLOUR, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
-MAGNIFIED = 3.0
-RADIUS, HEIGHT = 0.33, 0.95
+MAGNIFICATION = 3.0
+WHEEL_RADIUS, CHASSIS_HEIGHT = 0.33, 0.95
 """m: of the wheels and of the chassis' centre above the road; the model has neither."""
-KINDS = {"wheel force": Kind((0.0, 0.62, 0.45), 1.2e-4, 4e3), "suspension force": Kind((0.84, 0.2, 0.0), 1.2e-4, 4e3)}
-CURVE = ForceCurve("wheel force", (0.0, 0.0, -1.0), "upwards")
-PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+ARROW_STYLES = {
+    "wheel force": ArrowStyle((0.0, 0.62, 0.45), 1.2e-4, 4e3),
+    "suspension force": ArrowStyle((0.84, 0.2, 0.0), 1.2e-4, 4e3),
+}
+FORCE_CURVE = ForceCurve("wheel force", (0.0, 0.0, -1.0), "upwards")
+EXUDYN_AXES = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 """Exudyn's axes as columns: backward, down, to the right."""
 
 
@@ -36,28 +39,28 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
             "effects": {"road": {"source": "iso8608", "road_class": "D", "seed": SEED, "speed": SPEED}},
         }
     )
-    assembly = assemble(scene)
-    runs = [_motion(engine, assembly, times) for engine in engines]
+    assembly = assembly_of_scene(scene)
+    runs = [_motion_of_engine(engine, assembly, times) for engine in engines]
     return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
 
 
-def _motion(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[FilmedMotion, Channels]:
+def _motion_of_engine(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[FilmedMotion, Channels]:
     model: Any = build(engine, assembly, settings_of(assembly.scene, engine))
     run = model.run()
-    channels = outputs(assembly, run)
+    channels = output_channels(assembly, run)
     rows = np.rint(times / (run.times[1] - run.times[0])).astype(int)
-    places, turns = (_exudyn if engine == "exudyn" else _mujoco)(model, run.states[rows, :4])
-    poses = {name: place + _offset(assembly, name) for name, place in places.items()}, turns
+    places, turns = (_exudyn_poses if engine == "exudyn" else _mujoco_poses)(model, run.states[rows, :4])
+    poses = {name: place + _body_offset(assembly, name) for name, place in places.items()}, turns
     return FilmedMotion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
 
 
-def _mujoco(model: Any, states: np.ndarray) -> Poses:
+def _mujoco_poses(model: Any, states: np.ndarray) -> Poses:
     names = [body.name for body in model.assembly.vehicle.bodies]
     places, turns = of_mujoco(model.model, {name: model.model.body(name).id for name in names}, states)
     return {name: place * [0.0, 1.0, 1.0] for name, place in places.items()}, turns
 
 
-def _exudyn(model: Any, states: np.ndarray) -> Poses:
+def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
     """Poses of the bodies from the coordinates of Exudyn's nodes in the plane. Wheels are point masses, which do not
     rotate."""
     import exudyn as exu
@@ -73,23 +76,23 @@ def _exudyn(model: Any, states: np.ndarray) -> Poses:
     coordinates[:, [1, 3, 5, 6]] = states
     places, turns = of_exudyn(mbs, {name: partial(ask, node) for name, node in nodes.items()}, coordinates)
     return (
-        {name: place @ PLANE.T for name, place in places.items()},
-        {name: PLANE @ turn @ PLANE.T for name, turn in turns.items()},
+        {name: place @ EXUDYN_AXES.T for name, place in places.items()},
+        {name: EXUDYN_AXES @ turn @ EXUDYN_AXES.T for name, turn in turns.items()},
     )
 
 
-def _offset(assembly: Assembly, body: str) -> np.ndarray:
+def _body_offset(assembly: Assembly, body: str) -> np.ndarray:
     """Position (3,) in m at which a body is drawn when its coordinates are zero. The model has no longitudinal
     positions, and its heights count from here."""
     x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body)
-    return np.array([0.0, 0.0, -HEIGHT]) if x is None else np.array([x, 0.0, -RADIUS])
+    return np.array([0.0, 0.0, -CHASSIS_HEIGHT]) if x is None else np.array([x, 0.0, -WHEEL_RADIUS])
 
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Arrows of the road's forces on the wheels and of the suspension's forces on the chassis."""
     up, (places, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
-        road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])
+        road, mount = np.array([0.0, 0.0, WHEEL_RADIUS]), np.array([axle.x, 0.0, 0.0])
         on_wheel, on_chassis = (channels[name][2][rows, None] * up for name in (wheel, strut))
         mounts = places["chassis"] + turns["chassis"] @ mount
         arrows_drawn.append(
@@ -103,12 +106,12 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
     """The vehicle, seen from its right, on a road that passes by; z down."""
     height = channels["zeta1"][2]
     way = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
-    road = PassingRoad(way, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFIED, 1.0)
+    road = PassingRoad(way, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFICATION, 1.0)
     level = equilibrium(assembly.parameters, assembly.vehicle.geometry)
     names = [body.name for body in assembly.vehicle.bodies]
-    rest = {name: _offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)}
+    rest = {name: _body_offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)}
     struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
-    caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces on wheels and chassis"
+    caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces on wheels and chassis"
     camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.66), (0.0, 0.0, -1.0), 0.46)
     return Stage(
         f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D",
@@ -116,10 +119,10 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
         shapes(assembly),
         rest,
         camera,
-        KINDS,
-        CURVE,
+        ARROW_STYLES,
+        FORCE_CURVE,
         road.at,
-        MAGNIFIED,
+        MAGNIFICATION,
         struts=struts,
     )
 
@@ -127,5 +130,5 @@ def stage(assembly: Assembly, channels: Channels) -> Stage:
 def shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
     """A beam for the chassis and two wheels."""
     p = assembly.parameters
-    beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT).at((p.b - p.a) / 2.0, 0.0, -0.07)
-    return {axle.wheel: tyred_wheel(RADIUS) for axle in assembly.vehicle.axles} | {"chassis": [beam]}
+    beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT_COLOUR).at((p.b - p.a) / 2.0, 0.0, -0.07)
+    return {axle.wheel: tyred_wheel(WHEEL_RADIUS) for axle in assembly.vehicle.axles} | {"chassis": [beam]}

@@ -15,13 +15,13 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Poses, Stage, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Poses, Stage, of_exudyn, of_mujoco
 from studies.pictures.road import DRAWN_ROAD, PassingRoad
-from studies.pictures.shapes import PAINT, Colour, PaintedSurface, ball, box, extruded, tyred_wheel
+from studies.pictures.shapes import PAINT_COLOUR, Colour, PaintedSurface, ball, box, extruded_outline, tyred_wheel
 
-SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
+SPEED, STEP, SEED, LATERAL_START_SPEED = 20.0, 1e-3, 3, 0.5
 """m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
-MAGNIFIED = 4.0
+MAGNIFICATION = 4.0
 SCENE = {
     "title": "",
     "system": "ride",
@@ -29,40 +29,45 @@ SCENE = {
     "road": {"iso8608": "C"},
     "speeds": {"values": [SPEED]},
 }
-KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
-CURVE = ForceCurve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
-ENGINE: Colour = (0.75, 0.45, 0.15)
-PERSON: Colour = (0.93, 0.76, 0.55)
+ARROW_STYLES = {
+    "wheel load": ArrowStyle((0.0, 0.62, 0.45), 1.6e-4, 4e3),
+    "side force": ArrowStyle((0.84, 0.2, 0.0), 6e-4, 1e3),
+}
+FORCE_CURVE = ForceCurve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
+ENGINE_COLOUR: Colour = (0.75, 0.45, 0.15)
+PERSON_COLOUR: Colour = (0.93, 0.76, 0.55)
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
     scene = ride_scene(SCENE)
-    vehicle = reporting(vehicle_of(scene))
+    vehicle = vehicle_with_road_forces(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
     steps = int(np.ceil(duration / road.step))
     table = road.table(steps + int(DRAWN_ROAD / SPEED / road.step), SEED)
     rows = np.rint(times / road.step).astype(int)
-    motions = [_motion(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
+    motions = [_motion_of_engine(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
     return stage(vehicle, road, table), motions
 
 
-def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
+def vehicle_with_road_forces(vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with the outputs of its road forces: tyre forces, then lateral speeds where side forces act."""
     tyres = tuple(TyreOutput(tyre.name, "tyre force", tyre.name) for tyre in vehicle.tyres)
     across = tuple(PointOutput(f.name, "velocity", f.body, f.point, (0.0, 1.0, 0.0)) for f in vehicle.side_forces)
     return replace(vehicle, outputs=(*tyres, *across))
 
 
-def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> FilmedMotion:
+def _motion_of_engine(
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray
+) -> FilmedMotion:
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
     model: Any = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
-    gust = np.array([GUST if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
+    gust = np.array([LATERAL_START_SPEED if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
     run = model.run(zero, gust)
     kept = Trajectory(run.times[rows], run.states[rows])
     if engine == "exudyn":
-        poses = _exudyn(model, kept.positions)
+        poses = _exudyn_poses(model, kept.positions)
     else:
         joints = np.empty_like(kept.positions)
         joints[:, model.numbers.columns] = kept.positions
@@ -70,7 +75,7 @@ def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndar
     return FilmedMotion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
 
 
-def _exudyn(model: Any, positions: np.ndarray) -> Poses:
+def _exudyn_poses(model: Any, positions: np.ndarray) -> Poses:
     markers = {body.name: model.built.marker(body.name, body.position, True) for body in model.vehicle.bodies}
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
@@ -89,17 +94,19 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
     ]
     held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
     arrows = [
-        _arrow("wheel load", vehicle, tyre, held[tyre.name] + force, 2, poses)
+        _road_force_arrow("wheel load", vehicle, tyre, held[tyre.name] + force, 2, poses)
         for tyre, force in zip(vehicle.tyres, forces, strict=False)
     ]
     for side, speed in zip(vehicle.side_forces, forces[len(vehicle.tyres) :], strict=True):
         roll, yaw = (run.positions[:, names.index((side.chassis, freedom))] for freedom in ("rx", "rz"))
         force = side.stiffness * (side.roll_steer * roll + yaw - speed / SPEED)
-        arrows.append(_arrow("side force", vehicle, side, force, 1, poses))
+        arrows.append(_road_force_arrow("side force", vehicle, side, force, 1, poses))
     return tuple(arrows)
 
 
-def _arrow(kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses) -> Arrow:
+def _road_force_arrow(
+    kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses
+) -> Arrow:
     """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
     on its body."""
     (x, y, _), body = place.point, place.body
@@ -113,27 +120,27 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
     columns = [vehicle.tyres.index(tyre) for tyre in front]
     way = front[0].point[0] + SPEED * road.half * np.arange(len(table))
     tracks = front[0].point[1], front[1].point[1]
-    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnified=MAGNIFIED)
+    passing = PassingRoad(way, table[:, columns], tracks, SPEED, magnification=MAGNIFICATION)
     rest = {body.name: body.position for body in vehicle.bodies}
     camera = Camera((5.6, 4.6, 2.3), (-0.1, 0.1, 0.5), opening=0.5)
-    caption = f"displacements and road drawn {MAGNIFIED:g} times as large; forces of the road on the tyres"
+    caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces of the road on the tyres"
     title = f"Car of {len(vehicle.coordinates())} freedoms at {SPEED:g} m/s on a road of class C, after a gust"
-    return Stage(title, caption, shapes(vehicle), rest, camera, KINDS, CURVE, passing.at, MAGNIFIED)
+    return Stage(title, caption, shapes(vehicle), rest, camera, ARROW_STYLES, FORCE_CURVE, passing.at, MAGNIFICATION)
 
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
     """Surfaces of wheels at the tyres, a car around the chassis, and the engine and occupants inside."""
-    person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
+    person = [ball(0.13, PERSON_COLOUR).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON_COLOUR).at(0.0, 0.0, 0.02)]
     return {
         **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
-        "engine": [box(0.5, 0.7, 0.45, ENGINE)],
+        "engine": [box(0.5, 0.7, 0.45, ENGINE_COLOUR)],
         "left seat": person,
         "right seat": person,
-        "body": _car(vehicle),
+        "body": _car_body(vehicle),
     }
 
 
-def _car(vehicle: SpatialVehicle) -> list[PaintedSurface]:
+def _car_body(vehicle: SpatialVehicle) -> list[PaintedSurface]:
     """Transparent car body of two convex outlines, about the chassis' centre of mass."""
     x, _, z = vehicle.body("body").position
     front, rear = max(t.point[0] for t in vehicle.tyres), min(t.point[0] for t in vehicle.tyres)
@@ -148,4 +155,7 @@ def _car(vehicle: SpatialVehicle) -> list[PaintedSurface]:
     ]
     upper = [(rear - 0.45, 0.92), (front - 0.38, 0.88), (front - 1.05, 1.38), (rear + 0.15, 1.4)]
     outlines = ((lower, 1.66, 0.42), (upper, 1.4, 0.3))
-    return [replace(extruded(np.array(line) - [x, z], wide, PAINT), alpha=alpha) for line, wide, alpha in outlines]
+    return [
+        replace(extruded_outline(np.array(line) - [x, z], wide, PAINT_COLOUR), alpha=alpha)
+        for line, wide, alpha in outlines
+    ]

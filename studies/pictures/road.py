@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.pictures.shapes import Colour, PaintedSurface, box, faceted, floor, patches
+from studies.pictures.shapes import Colour, PaintedSurface, box, faceted_surface, floor, net_triangles
 
 LIGHT_GREY: Colour = (0.60, 0.61, 0.63)
-DARK: Colour = (0.54, 0.55, 0.57)
-GRASS: Colour = (0.55, 0.64, 0.46)
-LINE: Colour = (0.97, 0.97, 0.95)
+ASPHALT_COLOUR: Colour = (0.54, 0.55, 0.57)
+GRASS_COLOUR: Colour = (0.55, 0.64, 0.46)
+LINE_COLOUR: Colour = (0.97, 0.97, 0.95)
 DRAWN_ROAD = 45.0
 """m of road that are drawn to both sides of the vehicle."""
-TILE = 0.5
+TILE_LENGTH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,43 +20,46 @@ class PassingRoad:
     """A road that moves past the vehicle at a speed (m/s): heights (m) at ``distances`` (m) along it and lateral
     positions ``tracks`` (m).
 
-    up : the vertical component of the direction up, 1 or -1; magnified : of the heights; half : width (m).
+    up_component : the vertical component of the direction up, 1 or -1; magnification : of the heights; half : width
+    (m).
     """
 
     distances: np.ndarray
     heights: np.ndarray
     tracks: tuple[float, float]
     speed: float
-    up: float = 1.0
-    magnified: float = 1.0
+    up_component: float = 1.0
+    magnification: float = 1.0
     half: float = 2.6
 
     def at(self, time: float) -> list[PaintedSurface]:
         """Road, lines along both its edges and the grass at a time (s)."""
-        first = np.floor((self.speed * time - DRAWN_ROAD) / TILE)
-        stations = np.arange(first, first + 2.0 * DRAWN_ROAD / TILE)
-        across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE) + 1)
-        x, y = np.meshgrid(TILE * stations - self.speed * time, across, indexing="ij")
+        first = np.floor((self.speed * time - DRAWN_ROAD) / TILE_LENGTH)
+        stations = np.arange(first, first + 2.0 * DRAWN_ROAD / TILE_LENGTH)
+        across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE_LENGTH) + 1)
+        x, y = np.meshgrid(TILE_LENGTH * stations - self.speed * time, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
         dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
-        if self.up < 0:
+        if self.up_component < 0:
             net, dark = net[:, ::-1], dark[:, ::-1]
-        grass = floor(-0.35 * self.up, GRASS, self.up)
+        grass = floor(-0.35 * self.up_component, GRASS_COLOUR, self.up_component)
         side, starts = self.half - 0.15, 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
         marks = [
-            box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
+            box(1.6, 0.1, 0.02, LINE_COLOUR).at(
+                x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up_component
+            )
             for x in starts
             for y in (-side, side)
         ]
-        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT_GREY), grass, *marks]
+        return [_chosen_tiles(net, dark, ASPHALT_COLOUR), _chosen_tiles(net, ~dark, LIGHT_GREY), grass, *marks]
 
     def _height(self, distance: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Height (m) of the drawn road at a position along and across the path."""
         left, two = (np.interp(distance, self.distances, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
-        return self.magnified * (left + share * (two - left))
+        return self.magnification * (left + share * (two - left))
 
 
-def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> PaintedSurface:
+def _chosen_tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> PaintedSurface:
     """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
-    return faceted(patches(net)[np.tile(chosen.ravel(), 2)], colour)
+    return faceted_surface(net_triangles(net)[np.tile(chosen.ravel(), 2)], colour)

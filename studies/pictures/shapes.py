@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 Colour = tuple[float, float, float]
-PAINT: Colour = (0.16, 0.42, 0.72)
-RUBBER: Colour = (0.16, 0.16, 0.17)
-RIM: Colour = (0.78, 0.79, 0.8)
+PAINT_COLOUR: Colour = (0.16, 0.42, 0.72)
+RUBBER_COLOUR: Colour = (0.16, 0.16, 0.17)
+RIM_COLOUR: Colour = (0.78, 0.79, 0.8)
 FLOOR_DISTANCE = 150.0
 """m to the edges of a floor."""
 
@@ -34,7 +34,7 @@ class PaintedSurface:
         return replace(self, corners=self.corners + np.array(place))
 
 
-def faceted(corners: np.ndarray, colour: Colour) -> PaintedSurface:
+def faceted_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
     """Triangles (m, 3, 3) with flat faces; counter-clockwise seen from outside."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -42,7 +42,7 @@ def faceted(corners: np.ndarray, colour: Colour) -> PaintedSurface:
     return PaintedSurface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
 
-def patches(points: np.ndarray) -> np.ndarray:
+def net_triangles(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
     first, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
@@ -50,7 +50,7 @@ def patches(points: np.ndarray) -> np.ndarray:
     )
 
 
-def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> PaintedSurface:
+def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> PaintedSurface:
     """Solid of revolution about y from the outline (axial, radii), given from left to right. It is shaded smoothly
     around the axis, with sharp edges at the outline's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
@@ -60,24 +60,29 @@ def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 4
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
     length = np.linalg.norm(slopes, axis=1, keepdims=True)
     slopes /= np.where(length > 0, length, 1.0)
-    corners = [patches(net[i : i + 2]) for i in range(len(slopes))]
-    normals = [patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
+    corners = [net_triangles(net[i : i + 2]) for i in range(len(slopes))]
+    normals = [net_triangles(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
     return PaintedSurface(np.concatenate(corners), np.concatenate(normals), colour)
 
 
 def tyred_wheel(radius: float) -> list[PaintedSurface]:
     """A tyre and its rim."""
-    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
-    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
+    tyre = surface_of_revolution(
+        [-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER_COLOUR
+    )
+    return [
+        tyre,
+        surface_of_revolution([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM_COLOUR),
+    ]
 
 
 def box(x: float, y: float, z: float, colour: Colour) -> PaintedSurface:
     """A box about the origin with these edges."""
     half = np.array([x, y, z]) / 2.0
-    return extruded(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
+    return extruded_outline(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
 
 
-def extruded(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurface:
+def extruded_outline(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurface:
     """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
@@ -85,7 +90,7 @@ def extruded(outline: np.ndarray, width: float, colour: Colour) -> PaintedSurfac
         np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1) for side in (front, back[::-1])
     ]
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
-    return faceted(np.concatenate([*fan, patches(closed)]), colour)
+    return faceted_surface(np.concatenate([*fan, net_triangles(closed)]), colour)
 
 
 def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
@@ -96,13 +101,13 @@ def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
     """
     lines = FLOOR_DISTANCE * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
     x, y = np.meshgrid(up * lines, lines, indexing="ij")
-    return faceted(patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
+    return faceted_surface(net_triangles(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 
 
 def ball(radius: float, colour: Colour) -> PaintedSurface:
     """A sphere about the origin."""
     angle = np.linspace(0.0, np.pi, 17)
-    round_about = revolved(-radius * np.cos(angle), radius * np.sin(angle), colour, 32)
+    round_about = surface_of_revolution(-radius * np.cos(angle), radius * np.sin(angle), colour, 32)
     return replace(round_about, normals=round_about.corners / radius)
 
 
@@ -115,7 +120,7 @@ def line_solid(
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     aside /= np.linalg.norm(aside)
     turn = np.column_stack([aside, along, np.cross(aside, along)])
-    return revolved(axial, radii, colour, 16).moved(tail, turn)
+    return surface_of_revolution(axial, radii, colour, 16).moved(tail, turn)
 
 
 def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:

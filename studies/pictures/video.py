@@ -10,12 +10,12 @@ from matplotlib.image import imsave
 
 from models.core.whole_files import whole_file
 
-PACKAGES = ("imageio", "imageio_ffmpeg")
+VIDEO_PACKAGES = ("imageio", "imageio_ffmpeg")
 
 
 def missing_extra(format_name: str) -> str:
     """Sentence that names the extra to install if a film format needs one that is missing; else empty."""
-    if format_name == "png" or all(find_spec(name) for name in PACKAGES):
+    if format_name == "png" or all(find_spec(name) for name in VIDEO_PACKAGES):
         return ""
     return (
         f"no {format_name} is written without the extra 'video': pip install 'twinrig[video]'; the stills need nothing"

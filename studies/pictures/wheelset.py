@@ -10,43 +10,46 @@ from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.equations import ROLL, YAW, WheelsetPath, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.profile_contact import Pose
-from models.rail.wheelset import CHOSEN, Wheelset
+from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.of_scene import equations_and_start
 from models.systems.wheelset.run import run as simulate
 from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, FilmedMotion, ForceCurve, Kind, Stage, of_exudyn, of_mujoco
-from studies.pictures.shapes import Colour, PaintedSurface, box, extruded, floor, revolved
+from studies.pictures.film import Arrow, ArrowStyle, FilmedMotion, ForceCurve, Stage, of_exudyn, of_mujoco
+from studies.pictures.shapes import Colour, PaintedSurface, box, extruded_outline, floor, surface_of_revolution
 
-SPEED, SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
+SPEED, START_SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
 """Speed of travel (m/s), first lateral displacement (m), cells of FASTSIM, step (s)."""
-MAGNIFIED = 5.0
-SLEEPERS = 0.6
+MAGNIFICATION = 5.0
+SLEEPER_SPACING = 0.6
 """m from one sleeper to the next."""
-STEEL: Colour = (0.62, 0.66, 0.71)
-DARK: Colour = (0.42, 0.45, 0.5)
-BROWN: Colour = (0.45, 0.27, 0.16)
-RAIL: Colour = (0.66, 0.56, 0.5)
-CONCRETE: Colour = (0.72, 0.71, 0.68)
-BALLAST: Colour = (0.56, 0.54, 0.51)
-KINDS = {"normal force": Kind((0.0, 0.62, 0.45), 8e-6, 5e4), "creep force": Kind((0.84, 0.2, 0.0), 1e-4, 2e3)}
-CURVE = ForceCurve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
-SIDES = {"right": RIGHT, "left": LEFT}
+STEEL_COLOUR: Colour = (0.62, 0.66, 0.71)
+DARK_COLOUR: Colour = (0.42, 0.45, 0.5)
+RUST_COLOUR: Colour = (0.45, 0.27, 0.16)
+RAIL_COLOUR: Colour = (0.66, 0.56, 0.5)
+CONCRETE_COLOUR: Colour = (0.72, 0.71, 0.68)
+BALLAST_COLOUR: Colour = (0.56, 0.54, 0.51)
+ARROW_STYLES = {
+    "normal force": ArrowStyle((0.0, 0.62, 0.45), 8e-6, 5e4),
+    "creep force": ArrowStyle((0.84, 0.2, 0.0), 1e-4, 2e3),
+}
+FORCE_CURVE = ForceCurve("creep force", (0.0, 1.0, 0.0), "across the track, to the right")
+SIDE_SIGNS = {"right": RIGHT, "left": LEFT}
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
     """The stage, and each engine's motion in the frames, which are taken at the steps nearest to ``times`` (s)."""
-    return stage(CHOSEN), [_motion(engine, duration, times) for engine in engines]
+    return stage(CHOSEN_WHEELSET), [_motion_of_engine(engine, duration, times) for engine in engines]
 
 
-def _motion(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
+def _motion_of_engine(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
     scene = build(
         {
             "title": "wheelset",
             "system": "wheelset",
             "contact": {"cells": CELLS},
             "speeds": {"values": [SPEED]},
-            "run": {"duration": duration, "step": STEP, "displacement": SHIFT, "speeds": [SPEED]},
+            "run": {"duration": duration, "step": STEP, "displacement": START_SHIFT, "speeds": [SPEED]},
         }
     )
     equations: Any = equations_and_start(scene, engine, SPEED)[0]
@@ -67,13 +70,13 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> FilmedMotion:
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-    return FilmedMotion(engine, kept.times, *poses, arrows(CHOSEN, kept), run)
+    return FilmedMotion(engine, kept.times, *poses, arrows(CHOSEN_WHEELSET, kept), run)
 
 
 def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
     """Arrows of the normal force and of the creep force on both wheels, at the contact points along a path."""
     every = []
-    for k, (name, side) in enumerate(SIDES.items()):
+    for k, (name, side) in enumerate(SIDE_SIGNS.items()):
         cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
         touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in path.states]
         points = np.array(touched)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
@@ -83,7 +86,7 @@ def arrows(w: Wheelset, path: WheelsetPath) -> tuple[Arrow, ...]:
         creep = np.stack([contact["fx"], contact["fy"] * cosine, contact["fy"] * sine], 1)
         every += [
             Arrow(f"{kind}, {name}", kind, "wheelset", points, force)
-            for kind, force in zip(KINDS, (normal, creep), strict=True)
+            for kind, force in zip(ARROW_STYLES, (normal, creep), strict=True)
         ]
     return tuple(every)
 
@@ -93,14 +96,14 @@ def stage(wheelset: Wheelset) -> Stage:
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
     return Stage(
         f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM",
-        f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels",
+        f"displacements drawn {MAGNIFICATION:g} times as large; forces on the wheels",
         {"wheelset": shapes(wheelset)},
         {"wheelset": (0.0, 0.0, 0.0)},
         camera,
-        KINDS,
-        CURVE,
+        ARROW_STYLES,
+        FORCE_CURVE,
         lambda time: track(wheelset, SPEED * time),
-        MAGNIFIED,
+        MAGNIFICATION,
         ("wheelset",),
     )
 
@@ -108,15 +111,15 @@ def stage(wheelset: Wheelset) -> Stage:
 def shapes(w: Wheelset) -> list[PaintedSurface]:
     """Surfaces of an axle and two wheels with the model's conical treads. The flange clearance is drawn magnified."""
     end = w.half_spacing + 0.12
-    surfaces = [revolved([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK)]
-    inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
+    surfaces = [surface_of_revolution([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK_COLOUR)]
+    inner, outer = 0.036 + MAGNIFICATION * w.flange_clearance + 0.004, 0.075
     across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + w.half_gauge
     tread = [w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer]
     radii = np.array([0.0, *tread, 0.39, 0.37, 0.19, 0.16, 0.0])
     for side, order in ((1.0, slice(None)), (-1.0, slice(None, None, -1))):
-        surfaces.append(revolved(side * across[order], radii[order], STEEL, pieces=72))
+        surfaces.append(surface_of_revolution(side * across[order], radii[order], STEEL_COLOUR, pieces=72))
         surfaces += [
-            box(0.09, 0.03, 0.09, BROWN).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
+            box(0.09, 0.03, 0.09, RUST_COLOUR).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
             for a in np.arange(6) * np.pi / 3.0
             for y in (0.016, -inner - 0.02)
         ]
@@ -129,13 +132,13 @@ def track(w: Wheelset, distance: float) -> list[PaintedSurface]:
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
     along = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
     rail = [
-        extruded(head, last - first, STEEL).moved(np.zeros(3), along),
-        box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
-        box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16),
+        extruded_outline(head, last - first, STEEL_COLOUR).moved(np.zeros(3), along),
+        box(last - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
+        box(last - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
     ]
     sides = w.half_gauge, -w.half_gauge
     surfaces = [part.at((first + last) / 2.0, y, top) for y in sides for part in rail]
-    phase = distance % SLEEPERS
-    for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
-        surfaces.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
-    return [*surfaces, floor(top + 0.24, BALLAST, -1.0)]
+    phase = distance % SLEEPER_SPACING
+    for i in range(int(np.ceil(first / SLEEPER_SPACING)), int(np.floor(last / SLEEPER_SPACING)) + 1):
+        surfaces.append(box(0.24, 2.5, 0.1, CONCRETE_COLOUR).at(i * SLEEPER_SPACING - phase + 0.3, 0.0, top + 0.22))
+    return [*surfaces, floor(top + 0.24, BALLAST_COLOUR, -1.0)]

@@ -11,7 +11,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
-from models.ride.copies_kernel import POWERS, march
+from models.ride.copies_kernel import POWERS_SUMMED, march
 from models.ride.nonlinear_copies import laws_of
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import excitation_of, vehicle_of
@@ -62,7 +62,7 @@ def copies(steps: int) -> tuple[Job, Job]:
     vehicle, road = scene()
     plain, roads = linearise(vehicle, road.speed), next(road.blocks(steps, COPIES, 0))
     laws, car, heights = laws_of(vehicle, plain, (), road.speed), numbers(Car.of(vehicle)), roads[:, :4].copy()
-    sums = np.zeros((POWERS, len(plain.outputs), COPIES))
+    sums = np.zeros((POWERS_SUMMED, len(plain.outputs), COPIES))
 
     def ours() -> np.ndarray:
         states = np.zeros((2 * len(plain.mass), COPIES))

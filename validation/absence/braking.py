@@ -33,16 +33,16 @@ def write(folder: Path) -> None:
 def counts_and_path(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Numbers of components (lags, controllers, noisy signals, ...) in the model of a braking scene, and the path as
     bytes."""
-    from models.systems.braking.march import Braked
+    from models.systems.braking.march import BrakedVehicle
     from models.systems.braking.run import run
 
-    counts, march = dict[str, int](), Braked.run
+    counts, march = dict[str, int](), BrakedVehicle.run
 
-    def watched(vehicle: Braked, controller: Any, *more: Any) -> Any:
+    def watched(vehicle: BrakedVehicle, controller: Any, *more: Any) -> Any:
         counts.update(_counts_of_run(vehicle, controller))
         return march(vehicle, controller, *more)
 
-    with mock.patch.object(Braked, "run", watched):
+    with mock.patch.object(BrakedVehicle, "run", watched):
         path = run(scene, engine, procedure=STOP).detail
     return counts, path.states.tobytes()
 
@@ -56,7 +56,7 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
     chain = [controller]
     while hasattr(chain[-1], "inner"):
-        chain.append(chain[-1].inner)
+        chain.append(chain[-1].controller)
     last, seeing = chain[-1], [part for part in chain if hasattr(part, "teeth")]
     conversions = [channels.conversion for part in seeing for channels in (part.wheels, part.pressures)]
     return {
@@ -64,7 +64,7 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
         "wheels": plane.wheels,
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
         "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
-        "time constants": int((chambers.fill > 0.0).sum() + (chambers.empty > 0.0).sum()),
+        "time constants": int((chambers.fill_time > 0.0).sum() + (chambers.empty_time > 0.0).sum()),
         "kept commands": (len(resting_chambers(chambers, vehicle.sample).commands) - 2) * plane.wheels,
         "slow fillings": chambers.slow.size,
         "volumes": chambers.volumes.size,

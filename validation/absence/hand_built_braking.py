@@ -13,17 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.plane_records import REPORTED, Report, report_of
+from models.brake.plane_records import REPORT_SIZE, Report, report_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import BrakingPath
-from models.systems.braking.procedures import controller_of, ready
-from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion
+from models.systems.braking.procedures import controller_of, vehicle_and_start
+from models.tyre.tyre_table import TableCell, Tables, cell_and_share, lateral_adhesion
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare_scene
 
-CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12
+ACCELERATION_TOLERANCE, LOCKING_SLIP, ANDERSON_ROUNDS = 1e-7, 0.98, 12
 MOST_PARTS = 64
 
 
@@ -50,7 +50,7 @@ class Step(NamedTuple):
     regular: float
 
 
-class Now(NamedTuple):
+class TruckState(NamedTuple):
     """Present state of the truck: x, y, heading and their rates (6,); accelerations (3,); angular velocities of the
     wheels (4,). Reports (7, 4) of the wheels for a step, and their sums over the parts of a step."""
 
@@ -58,7 +58,7 @@ class Now(NamedTuple):
     accelerations: np.ndarray
     turning: np.ndarray
     report: np.ndarray
-    sums: np.ndarray
+    weighted_sums: np.ndarray
 
 
 class Stop(NamedTuple):
@@ -129,7 +129,7 @@ def settle(now, regular, starts, truck, known):
 def tyre(i, given, now, truck, known):
     """Compute the forces, slip and angular velocity of wheel i at the end of a step, and store them in the report."""
     report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
-    sign, cells = 1.0 if u0 >= 0.0 else -1.0, Cells(known.cell[i], known.share[i], 0, 0.0)
+    sign, cells = 1.0 if u0 >= 0.0 else -1.0, TableCell(known.cell[i], known.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
         StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
         Wheel(truck.radius[i], truck.spin[i], sign * now.turning[i]),
@@ -137,9 +137,9 @@ def tyre(i, given, now, truck, known):
     )
     k, part = cell_and_share(tables.slips, abs(slip))
     side = load * lateral_adhesion(0, cells, k, part, tables.g, tables.h)
-    if slip > NEARLY and (known.along[i] > 0.0 or v != 0.0):
+    if slip > LOCKING_SLIP and (known.along[i] > 0.0 or v != 0.0):
         total, speed = math.hypot(force, side), math.hypot(known.along[i], v)
-        part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
+        part = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
         force += part * (total * known.along[i] / speed - force)
         side += part * (total * abs(v) / speed - side)
     report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
@@ -169,11 +169,11 @@ def respond(now, before, after, step, truck, known):
 
 
 @inlined
-def rounds(now, torques, step, truck, known):
+def iterate_accelerations(now, torques, step, truck, known):
     """Iterate until the accelerations agree with those that the tyre forces cause; returns whether this converged."""
     accelerations, last, off = now.accelerations, known.last, known.off
     left, before = math.inf, 0.0
-    for n in range(PATIENCE):
+    for n in range(ANDERSON_ROUNDS):
         out, change, product, square = respond(now, torques[0], torques[1], step, truck, known), 0.0, 0.0, 0.0
         for a in range(3):
             gap = out[a] - accelerations[a]
@@ -181,7 +181,7 @@ def rounds(now, torques, step, truck, known):
             product += gap * (gap - off[a])
             square += (gap - off[a]) ** 2
         left = change * min(change / before, 1.0) if before > 0.0 else change
-        done, before = not left > CLOSE or n == PATIENCE - 1, change
+        done, before = not left > ACCELERATION_TOLERANCE or n == ANDERSON_ROUNDS - 1, change
         mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not done else 0.0
         for a in range(3):
             off[a] = out[a] - accelerations[a]
@@ -189,11 +189,11 @@ def rounds(now, torques, step, truck, known):
             last[a] = out[a]
         if done:
             break
-    return left <= CLOSE
+    return left <= ACCELERATION_TOLERANCE
 
 
 @inlined
-def rests(now, first, step, truck):
+def time_of_rest(now, first, step, truck):
     """Time within the step at which the truck comes to rest, or -1 if it still moves at the end."""
     accelerations, mass, inertia = now.accelerations, truck.mass, truck.inertia
     speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
@@ -230,14 +230,14 @@ def go(now, torques, step, truck, known):
     settle(now, step.regular, True, truck, known)
     accelerations = respond(now, torques[0], middle, 0.5 * step.time, truck, known)
     now.accelerations[0], now.accelerations[1], now.accelerations[2] = accelerations
-    rest = rests(now, first, step.time, truck)
+    rest = time_of_rest(now, first, step.time, truck)
     if rest >= 0.0:
         moved_state(now, rest, known)
         now.state[3:], now.turning[:] = 0.0, 0.0
         return rest
     moved_state(now, 0.5 * step.time, known)
     settle(now, step.regular, False, truck, known)
-    if not rounds(now, torques, step.time, truck, known):
+    if not iterate_accelerations(now, torques, step.time, truck, known):
         return -1.0
     moved_state(now, step.time, known)
     turning = report_of(now.report).turning
@@ -250,7 +250,7 @@ def go(now, torques, step, truck, known):
 def in_parts(parts, now, torques, step, truck, known):
     """Advance by a ``Step`` in equal substeps with ``go``. The report is the mean over the substeps; times of locking
     are added."""
-    rows, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
+    rows, sums, part, time = now.report, now.weighted_sums, Step(step.time / parts, step.regular / parts), 0.0
     sums[:] = 0.0
     for k in range(parts):
         for i in range(4):
@@ -260,13 +260,13 @@ def in_parts(parts, now, torques, step, truck, known):
         if used < 0.0:
             return used
         time += used
-        for c in range(REPORTED):
+        for c in range(REPORT_SIZE):
             for i in range(4):
                 sums[c, i] += rows[c, i]
         if used < part.time:
             return time
     report, locked = report_of(rows), report_of(sums).locked
-    for c in range(REPORTED):
+    for c in range(REPORT_SIZE):
         for i in range(4):
             rows[c, i] = sums[c, i] / parts
     for i in range(4):
@@ -319,9 +319,9 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
     def marched() -> BrakingPath:
-        now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORTED, 4)))
+        now = TruckState(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORT_SIZE, 4)))
         now.state[3] = speed
-        stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORTED, 4))))
+        stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORT_SIZE, 4))))
         n = march(now, torque, vehicle.substeps, grid, truck, step_workspace(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return BrakingPath(
@@ -338,23 +338,25 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     return marched
 
 
-STEER, SUPPLY = 0.02, 0.5
+STEER_ANGLE, SUPPLY_PRESSURE = 0.02, 0.5
 """Angle of the front wheels (rad); pressure of the brakes (bar): all wheels roll down to walking pace, so that their
 whole motion takes part."""
 Job = Callable[[], BrakingPath]
 
 
-def stops(speed: float) -> tuple[Job, Job]:
+def bare_stops(speed: float) -> tuple[Job, Job]:
     """Two stops of the bare vehicle from a speed (m/s), ready to run: by twinrig and by the hand-written code."""
     scene = bare_scene(
-        "braking", brakes={"supply": SUPPLY}, procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER}}
+        "braking",
+        brakes={"supply": SUPPLY_PRESSURE},
+        procedures={STOP: {"kind": "j_turn", "speed": speed, "steer": STEER_ANGLE}},
     )
-    vehicle, start = ready(scene, STOP)
+    vehicle, start = vehicle_and_start(scene, STOP)
 
     def ours() -> BrakingPath:
         return vehicle.run(controller_of(scene, vehicle.plane.wheels, STOP), start, scene.run.duration)
 
-    return ours, run(vehicle, speed, STEER, len(ours().times))
+    return ours, run(vehicle, speed, STEER_ANGLE, len(ours().times))
 
 
 def forces(path: BrakingPath) -> np.ndarray:
@@ -362,7 +364,7 @@ def forces(path: BrakingPath) -> np.ndarray:
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 
-def gap(ours: BrakingPath, theirs: BrakingPath) -> float:
+def largest_difference(ours: BrakingPath, theirs: BrakingPath) -> float:
     """Largest difference between two stops: of states (m, rad, m/s, rad/s) and wheel speeds (rad/s), and of tyre
     forces, pressures and torques, these divided by their largest values."""
     shares = [
@@ -377,7 +379,9 @@ def gap(ours: BrakingPath, theirs: BrakingPath) -> float:
 
 
 def ratio_of_stops(speed: float, rounds: int) -> tuple[float, tuple[float, float, float]]:
-    """Largest difference between twinrig's stop from a speed (m/s) and the hand-written one (see ``gap``), and the
-    ratio of computing times with its confidence interval."""
-    jobs = stops(speed)
-    return gap(*(job() for job in jobs)), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
+    """Largest difference between twinrig's stop from a speed (m/s) and the hand-written one (see
+    ``largest_difference``), and the ratio of computing times with its confidence interval."""
+    jobs = bare_stops(speed)
+    return largest_difference(*(job() for job in jobs)), paired_ratio(
+        *interleave(jobs, rounds, clock=time.process_time)
+    )

@@ -18,10 +18,10 @@ from models.contact.material import MaterialPair
 from models.machine.compiled import njit
 from models.machine.timing import interleave, paired_ratio
 
-CELLS, AXIS, LOAD, FRICTION = 21, 5e-3, 8e4, 0.3
+CELLS_PER_STRIP, AXIS, LOAD, FRICTION = 21, 5e-3, 8e4, 0.3
 """Cells of a strip, semi-axes (m), load (N), coefficient of friction."""
-CREEP = (1e-3, 5e-4)
-CALLS = 200
+CREEPAGES = (1e-3, 5e-4)
+CALLS_PER_TURN = 200
 """In a turn."""
 
 
@@ -49,23 +49,23 @@ def forces(axis, limit, along, across, halves, shares, bound):
     return limit * fx, limit * fy
 
 
-def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
-    """Two functions that compute the same contact CALLS times, by twinrig and by hand-written code, and return fx, fy
-    (N)."""
+def contact_jobs() -> tuple[Callable[[], Array], Callable[[], Array]]:
+    """Two functions that compute the same contact CALLS_PER_TURN times, by twinrig and by hand-written code, and return
+    fx, fy (N)."""
     pair = MaterialPair()
-    product = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
+    product = Ellipse(1.0, pair, cells=CELLS_PER_STRIP, march="plain", flexibilities="three")
     flexible = tuple(float(value) for value in flexibilities(AXIS, AXIS, pair))[:2]
-    strips, cells = grid(CELLS, product.net.strips.shape[1], "intermediate").records
+    strips, cells = grid(CELLS_PER_STRIP, product.net.strips.shape[1], "intermediate").records
     halves, shares, bound = strips.half, strips.part, cells.bound
 
     def ours() -> Array:
-        for _ in range(CALLS):
-            rolled = product(AXIS, LOAD, FRICTION, *CREEP, 0.0)
+        for _ in range(CALLS_PER_TURN):
+            rolled = product(AXIS, LOAD, FRICTION, *CREEPAGES, 0.0)
         return np.array(rolled[:2])
 
     def theirs() -> Array:
-        for _ in range(CALLS):
-            along, across = CREEP[0] / flexible[0], CREEP[1] / flexible[1]
+        for _ in range(CALLS_PER_TURN):
+            along, across = CREEPAGES[0] / flexible[0], CREEPAGES[1] / flexible[1]
             written = forces(AXIS, FRICTION * LOAD, along, across, halves, shares, bound)
         return np.array(written)
 
@@ -75,7 +75,7 @@ def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
 def ratio_of_contacts(rounds: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference of the creep forces between twinrig and the hand-written code, divided by the friction limit;
     ratio of computing times with its confidence interval."""
-    jobs = calls()
+    jobs = contact_jobs()
     ours, theirs = (job() for job in jobs)
     gap = float(np.abs(ours - theirs).max()) / (FRICTION * LOAD)
     return gap, paired_ratio(*interleave(jobs, rounds, 5e-3, clock=time.process_time))

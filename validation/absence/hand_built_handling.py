@@ -24,7 +24,7 @@ from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
 from models.multibody.tree import cross, dot, plus, three, times
-from models.tyre.bristles import ORDER, THREE, net, shape_factor
+from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, net, shape_factor
 from models.vehicles.free_vehicle import SPECK
 
 SIZE, CELLS = 23, 21
@@ -34,7 +34,7 @@ TOUCH = size_of(CONTACT)
 
 
 @lean
-def law(numbers, t, q, v, f):
+def add_car_forces(numbers, t, q, v, f):
     """Add the generalised forces of the hand-written car to ``f`` (23,). All arguments but the time are pointers to
     doubles: the parameter table, coordinates, rates and forces."""
     head, q, v, f = array(numbers, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(f, (SIZE,))
@@ -53,14 +53,14 @@ def law(numbers, t, q, v, f):
     moment = plus(_engine(mounts, head, frame, q, v, f), _add_seat_forces(beyond(mounts, 3 * MOUNT), frame, q, v, f))
     for i in range(4):
         moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, passing, q, v, i, left))
-    _bar((head[6], head[7], head[8]), 0, left, q, f)
-    _bar((head[9], head[10], head[11]), 2, left, q, f)
+    _add_bar_forces((head[6], head[7], head[8]), 0, left, q, f)
+    _add_bar_forces((head[9], head[10], head[11]), 2, left, q, f)
     forces_within(
         records(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
         cells_in(array(cells, (5, CELLS)), head[13]),
-        THREE,
-        ORDER,
+        THREE_BRISTLES,
+        SECOND_ORDER_MARCH,
         Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
         forces,
     )
@@ -115,7 +115,7 @@ def _wheel(w, frame, passing, q, v, i, left):
 
 
 @lean
-def _bar(bar, i, left, q, f):
+def _add_bar_forces(bar, i, left, q, f):
     """Add the forces of an anti-roll bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the
     chassis' roll."""
     (stiffness, held, by), (places, pushes, _) = bar, left
@@ -192,7 +192,7 @@ def numbers_of(handling: Handling) -> np.ndarray:
         return [springs[name].stiffness, springs[name].damping, held[name]]
 
     wheels = []
-    for tyre, corner in zip(car.tyres, CORNERS, strict=True):
+    for tyre, corner in zip(car.tyres, CORNER_NAMES, strict=True):
         strut, load, width = springs[corner].axis, handling.held.tyres[tyre.name], handling.tyres.half_width
         sunk = load / tyre.stiffness
         radius = tyre.point[2] + sunk
@@ -229,13 +229,13 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     car, table = handling.vehicle, numbers_of(handling)
     chassis = car.body("body")
     bodies = "".join(
-        BODY.format(
+        BODY_TEXT.format(
             name=name,
-            joints="".join(JOINTS[kind] for kind in kinds),
-            mass=car.body(name).mass + SPECK * (kinds == WHEELED),
+            joints="".join(JOINT_TEXTS[kind] for kind in kinds),
+            mass=car.body(name).mass + SPECK * (kinds == WHEELED_FREEDOMS),
             pos=_text(np.subtract(car.body(name).position, chassis.position)),
         )
-        for name, kinds in RIDERS.items()
+        for name, kinds in BODIES_ON_CHASSIS.items()
     )
     inertias, axes = principal(chassis)
     built = mujoco.MjModel.from_xml_string(
@@ -252,8 +252,12 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
         )
     )
     built.body_inertia[1] = inertias
-    for name, kinds in RIDERS.items():
-        spin = [0.0, handling.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
+    for name, kinds in BODIES_ON_CHASSIS.items():
+        spin = (
+            [0.0, handling.tyres.spin_inertia, 0.0]
+            if kinds == WHEELED_FREEDOMS
+            else np.diagonal(car.body(name).inertia)
+        )
         built.body_inertia[built.body(name).id] = spin
     mujoco.mj_setConst(built, mujoco.MjData(built))
     built.numeric_data[:] = table
@@ -263,7 +267,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
 def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
     """A hand-written run from coordinates and rates (23,); the returned function gives states (steps + 1, 46)."""
     built = model_of(handling, step)
-    data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(law)
+    data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(add_car_forces)
 
     def marched() -> np.ndarray:
         with installed(callback):
@@ -277,17 +281,22 @@ def _text(numbers: Any) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
-CORNERS = ("front left", "front right", "rear left", "rear right")
-WHEELED = "xzP"
-RIDERS = {"engine": "zRP", **dict.fromkeys(("fl", "fr", "rl", "rr"), WHEELED), "left seat": "z", "right seat": "z"}
+CORNER_NAMES = ("front left", "front right", "rear left", "rear right")
+WHEELED_FREEDOMS = "xzP"
+BODIES_ON_CHASSIS = {
+    "engine": "zRP",
+    **dict.fromkeys(("fl", "fr", "rl", "rr"), WHEELED_FREEDOMS),
+    "left seat": "z",
+    "right seat": "z",
+}
 """Bodies on the chassis and their joints."""
-JOINTS = {
+JOINT_TEXTS = {
     "x": '<joint type="slide" axis="1 0 0"/>',
     "z": '<joint type="slide" axis="0 0 1"/>',
     "R": '<joint type="hinge" axis="1 0 0"/>',
     "P": '<joint type="hinge" axis="0 1 0"/>',
 }
-BODY = """
+BODY_TEXT = """
       <body name="{name}" pos="{pos}">
         {joints}
         <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>

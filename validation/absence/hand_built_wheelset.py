@@ -14,7 +14,7 @@ from models.contact.linear_theory import coefficient_at
 from models.machine.compiled import lean, njit
 from models.machine.records import size_of
 from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
-from models.rail.profile_contact import Pose, pressed
+from models.rail.profile_contact import Pose, normal_force_and_axes
 from models.rail.wheel_forces import REPORT, rails_of
 
 STATES = 10
@@ -35,7 +35,9 @@ def rates(state, speed, p, told, out, report):
     fy = fz = mx = my = mz = 0.0
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, Pose(y, z, roll, yaw), cone)
-        load, a, b = pressed(depth, 0.5 / (rolling * np.sqrt(1.0 + conicity * conicity)), 0.5 / head, modulus)
+        load, a, b = normal_force_and_axes(
+            depth, 0.5 / (rolling * np.sqrt(1.0 + conicity * conicity)), 0.5 / head, modulus
+        )
         vx, vy, vz = speed + wy * pz - wz * py, y_rate + wz * px - wx * pz, z_rate + wx * py - wy * px
         slip, turning = n_z * vy - n_y * vz, wy * n_y + wz * n_z
         xi_x, xi_y, xi_spin, ahead, aside, moment = vx / speed, slip / speed, turning / speed, 0.0, 0.0, 0.0

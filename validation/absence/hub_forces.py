@@ -10,9 +10,9 @@ from models.core.time_series import write_time_series
 from models.engines.cut_vehicle import build
 from models.multibody import cut_kernel as kernel
 from models.multibody.cut_kernel import WRENCH
-from models.systems.hub_forces.measurement import recorded
+from models.systems.hub_forces.measurement import recorded_measurement
 from models.systems.hub_forces.run import Measurement, measure
-from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
+from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
@@ -43,10 +43,10 @@ def write(folder: Path) -> None:
     forces = {
         f"{hub}_{name}": (next(iter(units)), (4e3 + 500.0 * rising) * (name == "fz"))
         for hub in HUBS
-        for name, units in COMPONENTS.items()
+        for name, units in COLUMNS_OF_HUB.items()
     }
     write_time_series(folder / "forces.csv", forces, PERIOD)
-    angles = {name: (next(iter(units)), 0.0 * rising) for name, units in ANGLES.items()}
+    angles = {name: (next(iter(units)), 0.0 * rising) for name, units in COLUMNS_OF_ANGLES.items()}
     write_time_series(folder / "angles.csv", angles, PERIOD)
 
 
@@ -59,7 +59,7 @@ def counts_and_path(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes
     head = model.numbers
     period = hub_inputs.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
     curved = not hub_inputs.held and np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
-    noisy_forces, noisy_angles = _noisy(measurement)
+    noisy_forces, noisy_angles = _noisy_columns(measurement)
     counts = {
         "runs on tyres": int(measurement.truth is not None),
         "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.uncut.tyres),
@@ -80,11 +80,11 @@ def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
     return build(engine, measurement.vehicle, measurement.hub_inputs("none", step, steps), step, steps * step).run
 
 
-def _noisy(measurement: Measurement) -> list[int]:
+def _noisy_columns(measurement: Measurement) -> list[int]:
     """Numbers of force columns and of angle columns that contain noise; 0 and 0 for measurements from files."""
     forces, angles, scene = measurement.forces, measurement.angles, measurement.scene
     if measurement.truth is None:
         return [0, 0]
-    clean = recorded(measurement.truth, scene.forces.frame, round(forces.period / scene.run.step))
+    clean = recorded_measurement(measurement.truth, scene.forces.frame, round(forces.period / scene.run.step))
     pairs = ((forces.samples, clean[0].samples), (angles.samples, clean[1].samples))
     return [int((told != true).any(axis=0).sum()) for told, true in pairs]

@@ -22,7 +22,7 @@ STEP, SHORT_RUN_STEPS = 5e-4, 40
 """Step of the wheelset's runs (s); steps of the shorter one of two that are counted."""
 
 
-def arrays(job: Callable[[], Any]) -> int:
+def allocated_arrays(job: Callable[[], Any]) -> int:
     """Number of arrays that compiled code allocates during a job, as counted by numba."""
     _nrt_python.memsys_enable_stats()
     try:
@@ -33,11 +33,11 @@ def arrays(job: Callable[[], Any]) -> int:
         _nrt_python.memsys_disable_stats()
 
 
-def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
+def bare_wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], WheelsetPath]]:
     """Two runs of the bare wheelset, by twinrig and by code written for linear creep on cones alone. Both check the
     path in the same way, and give states and contacts."""
     equations, times = equations_of(bare_scene("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
-    start = equations.displaced(1e-3)
+    start = equations.displaced_state(1e-3)
     theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
 
     def written() -> WheelsetPath:
@@ -52,7 +52,7 @@ def wheelsets(steps: int) -> tuple[Callable[[], WheelsetPath], Callable[[], Whee
 def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:
     """Largest difference of states (m, rad, m/s, rad/s) and contact forces (ratio to the load) between twinrig's
     wheelset and the hand-written one; ratio of their computing times."""
-    jobs = wheelsets(steps)
+    jobs = bare_wheelsets(steps)
     ours, theirs = (job() for job in jobs)
     gaps = [np.abs(ours.contacts[name] - theirs.contacts[name]).max() for name in ("load", "fx", "fy", "mz")]
     apart = max(gaps) / theirs.contacts["load"].max()
@@ -67,13 +67,13 @@ def arrays_per_steps(
     jobs = [job(steps) for steps in (short, long)]
     for warm in jobs:
         warm()
-    few, many = map(arrays, jobs)
+    few, many = map(allocated_arrays, jobs)
     return many - few
 
 
 def made_by_wheelset(which: int) -> int:
     """How many more arrays a longer run allocates: 0 for twinrig's bare wheelset, 1 for the hand-written one."""
-    return arrays_per_steps(lambda steps: wheelsets(steps)[which])
+    return arrays_per_steps(lambda steps: bare_wheelsets(steps)[which])
 
 
 def made_by_ride() -> int:
@@ -106,7 +106,7 @@ def made_by_braking(engine: str) -> tuple[int, int]:
     samples, counts = [], []
     for scene in (slow, fast):
         samples.append(len(run(scene, engine).times))
-        counts.append(arrays(partial(run, scene, engine)))
+        counts.append(allocated_arrays(partial(run, scene, engine)))
     return counts[1] - counts[0], samples[1] - samples[0]
 
 

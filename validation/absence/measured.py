@@ -9,7 +9,7 @@ import numpy as np
 from models.core.time_series import write_time_series
 from models.measured.faults_of_measurement import Faults
 from models.multibody import cut_kernel as kernel
-from models.systems.hub_forces.scene import ANGLES
+from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES
 from models.systems.measured import section_run
 from models.systems.measured.run import Examination, run
 from models.systems.measured.scene import MeasuredScene
@@ -27,7 +27,7 @@ CHANNELS = [
             "component": name.partition("_")[0],
             "frame": "inertial",
         }
-        for name in ANGLES
+        for name in COLUMNS_OF_ANGLES
     ),
 ]
 FILE: dict[str, Any] = {"file": "recording.csv", "channels": CHANNELS}
@@ -60,7 +60,7 @@ def write(folder: Path) -> None:
     """Write files of hub forces that carry the vehicle, and of angles of a vehicle that sways."""
     swing = np.sin(np.linspace(0.0, 3.0, SAMPLES))
     forces = dict.fromkeys(HUBS, ("N", 4000.0 + 100.0 * swing))
-    angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in ANGLES.items()}
+    angles = {name: (next(iter(units)), 1e-3 * swing) for name, units in COLUMNS_OF_ANGLES.items()}
     write_time_series(folder / "recording.csv", forces | angles, PERIOD)
 
 

@@ -20,11 +20,11 @@ from unittest import mock
 from models.core.errors import Refused
 from models.core.scene_effects import module_of, names_of, with_effects
 from models.core.systems import SYSTEMS, modules_of
-from validation.absence.probes import registered
-from validation.common.rows import Observed, Row, System, behaves
+from validation.absence.probes import registered_callbacks
+from validation.common.rows import Observed, Row, System, behaviour_row
 
 SYSTEM: System = "effects"
-FILES = {system: file for system, file in modules_of("validation.absence").items() if system in SYSTEMS}
+BARE_SCENE_FILES = {system: file for system, file in modules_of("validation.absence").items() if system in SYSTEMS}
 """System -> the file beside this one, of its name, that has its bare scene and counts what a run of a scene is made
 of; found by listing."""
 Counts = dict[str, dict[str, int]]
@@ -38,17 +38,17 @@ def file_of(system: str) -> Any:
     If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
     scene has in place of its own tables without such an effect, and with it.
     """
-    return import_module(FILES[system])
+    return import_module(BARE_SCENE_FILES[system])
 
 
 def bare_scene(system: str, **instead: Any) -> Any:
     """The bare scene of a system. Keyword arguments replace tables of the scene."""
     table = {**file_of(system).BARE_SCENE, **instead}
-    return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_folder(system).name))
+    return import_module(SYSTEMS[system].scene).build(table, "bare", Path(_scene_folder(system).name))
 
 
 @cache
-def _folder(system: str) -> tempfile.TemporaryDirectory[str]:
+def _scene_folder(system: str) -> tempfile.TemporaryDirectory[str]:
     """A temporary folder with the files that scenes of a system read; it lasts as long as this process."""
     folder = tempfile.TemporaryDirectory()
     getattr(file_of(system), "write", lambda place: None)(Path(folder.name))
@@ -66,13 +66,13 @@ def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, 
     and MuJoCo the largest number of callbacks during the run is counted, too."""
     file, seen_by_engine = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
-        with suppress(Refused), registered(engine) as callbacks:
+        with suppress(Refused), registered_callbacks(engine) as callbacks:
             counts, path = file.counts_and_path(scene, engine)
             seen_by_engine[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
     return seen_by_engine
 
 
-def controlled(system: str) -> tuple[str, ...]:
+def addable_effects(system: str) -> tuple[str, ...]:
     """Effects that can be added to a bare scene, with their usual values or with tables written by hand."""
     modules = {name: module_of(system, name) for name in names_of(system)}
     return tuple(
@@ -82,7 +82,7 @@ def controlled(system: str) -> tuple[str, ...]:
     )
 
 
-def pair(system: str, effect: str) -> tuple[Any, Any]:
+def scenes_with_and_without(system: str, effect: str) -> tuple[Any, Any]:
     """Two scenes that differ by one effect: the bare scene with only the effects that this effect needs, and the same
     with the effect."""
     if effect in by_hand(system):
@@ -92,20 +92,22 @@ def pair(system: str, effect: str) -> tuple[Any, Any]:
     return with_effects(bare_scene(system), *needs), with_effects(bare_scene(system), *needs, effect)
 
 
-def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
+def declared_counts(system: str, effect: str, engines: Iterable[str]) -> Counts:
     """Counts that the effect's file declares, engine by engine."""
     counts = module_of(system, effect).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
 def added_counts(system: str, effect: str, quick: bool = False) -> Counts:
-    """Counts that an effect adds, by engine: the difference between the two scenes of ``pair`` in engines that accept
-    both."""
+    """Counts that an effect adds, by engine: the difference between the two scenes of ``scenes_with_and_without`` in
+    engines that accept both."""
     before, after = (
         _counts_without_effect(system, effect, quick),
-        counts_and_paths(system, pair(system, effect)[1], quick),
+        counts_and_paths(system, scenes_with_and_without(system, effect)[1], quick),
     )
-    return {engine: _increases(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
+    return {
+        engine: _count_increases(before[engine], counts) for engine, (counts, _) in after.items() if engine in before
+    }
 
 
 def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
@@ -122,37 +124,40 @@ def _counts_text(system: str, needs: tuple[str, ...], tables: str, quick: bool) 
     return {engine: counts for engine, (counts, _) in counts_and_paths(system, scene, quick).items()}
 
 
-def _increases(counts_before: dict[str, int], counts_after: dict[str, int]) -> dict[str, int]:
+def _count_increases(counts_before: dict[str, int], counts_after: dict[str, int]) -> dict[str, int]:
     return {key: n - counts_before[key] for key, n in counts_after.items() if n != counts_before[key]}
 
 
-def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
+def probed_facts(systems: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> dict[str, Any]:
     """Facts for the report, to be gathered in a fresh process: modules that bare scenes and effects import, counts that
     effects add, and whether an effect's removal keeps the path."""
     modules_of = {
-        system: sorted({module for some in _modules(system).values() for module in some}) for system in systems
+        system: sorted({module for some in _modules_of_effects(system).values() for module in some})
+        for system in systems
     }
     for system in systems:
         if file_of(system).ENGINES[0] == "reference":
-            with _removed(system, modules_of[system]):
+            with _without_modules(system, modules_of[system]):
                 counts_and_paths(system, bare_scene(system), quick=True)
-    engines, bares = _loaded(["exudyn", "mujoco"]), dict[str, Any]()
+    engines, bares = _loaded_modules(["exudyn", "mujoco"]), dict[str, Any]()
     for system in systems:  # all of them before any effect, as two systems may have a module in common
-        with _removed(system, modules_of[system]):
-            bares[system] = counts_and_paths(system, bare_scene(system)), _loaded(modules_of[system])
-    return {"engines": engines, "systems": {system: _probed(system, *bares[system]) for system in systems}}
+        with _without_modules(system, modules_of[system]):
+            bares[system] = counts_and_paths(system, bare_scene(system)), _loaded_modules(modules_of[system])
+    return {"engines": engines, "systems": {system: _probed_in_process(system, *bares[system]) for system in systems}}
 
 
-def _modules(system: str) -> dict[str, tuple[str, ...]]:
+def _modules_of_effects(system: str) -> dict[str, tuple[str, ...]]:
     return {name: module_of(system, name).MODULES for name in names_of(system)}
 
 
-def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], imported: list[str]) -> dict[str, Any]:
-    modules = _modules(system)
+def _probed_in_process(
+    system: str, first: dict[str, tuple[dict[str, int], bytes]], imported: list[str]
+) -> dict[str, Any]:
+    modules = _modules_of_effects(system)
     adds, missing = dict[str, Counts](), []
-    for name in controlled(system):
+    for name in addable_effects(system):
         adds[name] = added_counts(system, name)
-        missing += [module for module in modules[name] if not _loaded([module])]
+        missing += [module for module in modules[name] if not _loaded_modules([module])]
     last = counts_and_paths(system, bare_scene(system))
     callbacks = {engine: counts["callbacks"] for engine, (counts, _) in first.items() if engine != "reference"}
     return {
@@ -165,9 +170,9 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
 
 
 @contextmanager
-def _removed(system: str, modules: list[str]) -> Iterator[None]:
+def _without_modules(system: str, modules: list[str]) -> Iterator[None]:
     """Context in which the files of a system's effects, and modules that only they import, cannot be imported."""
-    assert not _loaded(modules), "the process is not fresh"
+    assert not _loaded_modules(modules), "the process is not fresh"
     blocked: dict[str, Any] = dict.fromkeys(modules)
     sys.modules.update(blocked)
     package = import_module(SYSTEMS[system].effects)
@@ -178,15 +183,15 @@ def _removed(system: str, modules: list[str]) -> Iterator[None]:
         del sys.modules[name]
 
 
-def _loaded(modules: list[str]) -> list[str]:
+def _loaded_modules(modules: list[str]) -> list[str]:
     there = [name for name, module in sys.modules.items() if module is not None]
     return [name for name in modules if any(loaded == name or loaded.startswith(f"{name}.") for loaded in there)]
 
 
 @cache
 def measured_counts() -> dict[str, Any]:
-    """The facts of ``probed``, computed in a process of their own."""
-    code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
+    """The facts of ``probed_facts``, computed in a process of their own."""
+    code = "import json; from validation.absence.of_systems import probed_facts; print(json.dumps(probed_facts()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
@@ -197,11 +202,15 @@ def rows(quick: bool) -> list[Row]:
     if quick:
         return [
             row
-            for system in FILES
-            for row in _present(system, {name: added_counts(system, name, quick) for name in controlled(system)[::3]})
+            for system in BARE_SCENE_FILES
+            for row in _added_count_rows(
+                system, {name: added_counts(system, name, quick) for name in addable_effects(system)[::3]}
+            )
         ]
     seen_there = measured_counts()
-    present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]
+    present = [
+        row for system, probe in seen_there["systems"].items() for row in _added_count_rows(system, probe["adds"])
+    ]
     engines = Observed(
         "absent.references.engines",
         SYSTEM,
@@ -226,7 +235,7 @@ def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
             len(seen_there["imported"]) + len(seen_there["missing"]),
             "",
         ).at_most(0, why, "none"),
-        behaves(
+        behaviour_row(
             f"absent.{system}.bits",
             SYSTEM,
             f"{system}: a bare scene takes the same path without the files of effects and after all effects ran",
@@ -252,15 +261,15 @@ def _absent_modules(system: str, seen_there: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _present(system: str, added_counts: dict[str, Counts]) -> list[Row]:
+def _added_count_rows(system: str, added_counts: dict[str, Counts]) -> list[Row]:
     """A row for each effect on the counts that it adds."""
     return [
-        behaves(
+        behaviour_row(
             f"absent.{system}.adds.{name}",
             SYSTEM,
             f"{system}: counts that the effect {name} adds to a bare scene",
             _text(counts),
-            _text(declared(system, name, counts)),
+            _text(declared_counts(system, name, counts)),
             "positive control: what its file says, and no more",
         )
         for name, counts in added_counts.items()

@@ -18,10 +18,10 @@ import numpy as np
 
 from models.engines.model import Model
 
-CALLBACKS = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor", "time")
+CALLBACK_NAMES = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor", "time")
 """MuJoCo's callbacks, all global to the process."""
 
-PROBE = """
+PROBE_SCRIPT = """
 import json, sys
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
@@ -40,7 +40,7 @@ print(json.dumps({
 
 def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[str, Any]:
     """Modules imported, kernels compiled and states (as hexadecimal bytes) after a scene was run in a fresh process."""
-    command = [sys.executable, "-c", PROBE, json.dumps(table), folder]
+    command = [sys.executable, "-c", PROBE_SCRIPT, json.dumps(table), folder]
     done = subprocess.run(command, capture_output=True, text=True, check=True, **options)
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -68,26 +68,26 @@ class MarchCounts:
     """Counts taken while an engine marched: Python frames, memory, callbacks.
 
     frames : Python functions entered, by the engine's own wrapper or from inside the march
-    memory : bytes that Python and numpy took at most, beyond what the march returned
+    peak_bytes : bytes that Python and numpy took at most, beyond what the march returned
     callbacks : MuJoCo callbacks that were installed
     """
 
     frames: int = 0
-    memory: int = 0
+    peak_bytes: int = 0
     callbacks: int = 0
 
 
-def installed() -> int:
+def installed_callbacks() -> int:
     """Number of MuJoCo callbacks that are installed in this process."""
     import mujoco
 
-    return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACKS)
+    return sum(getattr(mujoco, f"get_mjcb_{name}")() is not None for name in CALLBACK_NAMES)
 
 
 def march(engine: str, model: Model) -> MarchCounts:
     """Run a model once and count what its engine's march uses; the guard and the making of results are not counted."""
     seen = MarchCounts()
-    with _entry(engine, seen):
+    with _watched_entry(engine, seen):
         model.run()
     return seen
 
@@ -95,11 +95,11 @@ def march(engine: str, model: Model) -> MarchCounts:
 def leanest_march(engine: str, make_model: Callable[[], Model], runs: int = 3) -> MarchCounts:
     """The march with the least memory among several runs. Memory that the time loop needs occurs in every run, so that
     it is in the least, too."""
-    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.memory)
+    return min((march(engine, make_model()) for _ in range(runs)), key=lambda seen: seen.peak_bytes)
 
 
 @contextmanager
-def _entry(engine: str, counts: MarchCounts) -> Iterator[None]:
+def _watched_entry(engine: str, counts: MarchCounts) -> Iterator[None]:
     """Put a watch around the one function in which an engine spends its time."""
     if engine == "reference":
         from models.engines import reference
@@ -122,26 +122,26 @@ def _with_probes(function: Callable[..., Any], counts: MarchCounts) -> Callable[
     """The function, with frames, memory and callbacks added to ``counts``."""
 
     def call(*args: Any, **options: Any) -> Any:
-        counts.callbacks = max(counts.callbacks, installed())
+        counts.callbacks = max(counts.callbacks, installed_callbacks())
         tracemalloc.start()
-        sys.setprofile(lambda frame, event, argument: _count(counts, event))
+        sys.setprofile(lambda frame, event, argument: _count_frame(counts, event))
         try:
             result = function(*args, **options)
         finally:
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        counts.memory += peak - _size(result, [*args, *options.values()])
+        counts.peak_bytes += peak - _returned_bytes(result, [*args, *options.values()])
         return result
 
     return call
 
 
-def _count(counts: MarchCounts, event: str) -> None:
+def _count_frame(counts: MarchCounts, event: str) -> None:
     counts.frames += event == "call"
 
 
-def _size(result: Any, given: Sequence[Any]) -> int:
+def _returned_bytes(result: Any, given: Sequence[Any]) -> int:
     """Bytes of the arrays that a march returned, except for those that it received as arguments and filled."""
     parts = result if isinstance(result, tuple) else (result,)
     arrays = [part for part in parts if isinstance(part, np.ndarray)]
@@ -174,7 +174,7 @@ def _user_functions(mbs: Any) -> int:
 
 
 @contextmanager
-def registered(engine: str) -> Iterator[list[int]]:
+def registered_callbacks(engine: str) -> Iterator[list[int]]:
     """Context in which callbacks are counted: for every Exudyn system that is marched, or whenever a MuJoCo callback is
     set or cleared. It yields the list of counts."""
     functions, patches = list[int](), list[Any]()
@@ -182,28 +182,30 @@ def registered(engine: str) -> Iterator[list[int]]:
         import mujoco
 
         patches = [
-            mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), functions))
-            for name in (f"set_mjcb_{callback}" for callback in CALLBACKS)
+            mock.patch.object(mujoco, name, _counting_setter(getattr(mujoco, name), functions))
+            for name in (f"set_mjcb_{callback}" for callback in CALLBACK_NAMES)
         ]
     elif engine == "exudyn":
         import exudyn as exu
 
-        patches = [mock.patch.object(exu.MainSystem, "SolveDynamic", _marching(exu.MainSystem.SolveDynamic, functions))]
+        patches = [
+            mock.patch.object(exu.MainSystem, "SolveDynamic", _counting_march(exu.MainSystem.SolveDynamic, functions))
+        ]
     with ExitStack() as stack:
         for patch in patches:
             stack.enter_context(patch)
         yield functions
 
 
-def _setting(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
+def _counting_setter(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
     def call(law: Any) -> None:
         function(law)
-        functions.append(installed())
+        functions.append(installed_callbacks())
 
     return call
 
 
-def _marching(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
+def _counting_march(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
     seen = dict[int, Any]()
 
     def call(mbs: Any, *args: Any, **options: Any) -> Any:

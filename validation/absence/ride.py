@@ -16,8 +16,8 @@ import numpy as np
 
 from models.core.tables import write_table
 from models.engines.spatial_protocol import build
-from models.ride.excited import excited
-from models.ride.weighting import weighted
+from models.ride.excited import vehicle_with_road
+from models.ride.weighting import system_with_weightings
 from models.systems.ride import of_scene
 from models.systems.ride.run import run
 from models.systems.ride.scene import RideScene
@@ -25,12 +25,12 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
-from validation.common.rows import Observed, Row, System, behaves
+from validation.common.rows import Observed, Row, System, behaviour_row
 from validation.ride.rides import paper_road
 
 SYSTEM: System = "effects"
 SPEEDS = (10.0, 20.0, 30.0)
-FOREIGN = (
+FOREIGN_MODULES = (
     "exudyn",
     "mujoco",
     "numba",
@@ -48,7 +48,7 @@ FOREIGN = (
 )
 """What a linear ride of the reference at constant speeds does without."""
 
-FILTERS = (("body centre", "Wk"), ("left occupant", "Wd"))
+WEIGHTED_OUTPUTS = (("body centre", "Wk"), ("left occupant", "Wd"))
 ENGINES = ("reference",)
 SPEED = 20.0
 BARE_SCENE: dict[str, Any] = {
@@ -84,7 +84,9 @@ def counts_and_path(scene: RideScene, engine: str) -> tuple[dict[str, int], byte
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
         road = of_scene.excitation_of(scene, wheels(vehicle))
-    system = weighted(excited(of_scene.linear_vehicle(vehicle, engine)(SPEED), road, SPEED), scene.weighting)
+    system = system_with_weightings(
+        vehicle_with_road(of_scene.linear_vehicle(vehicle, engine)(SPEED), road, SPEED), scene.weighting
+    )
     in_time = of_scene.goes_in_time(scene)
     counts = {
         "states": len(system.A),
@@ -107,7 +109,7 @@ def _with_fewest_copies() -> Any:
     return Sampling(copies=2, lasting=0.1)
 
 
-PROBE = """
+PROBE_SCRIPT = """
 import json, sys
 from models.systems.ride.run import run
 from models.systems.ride.scene import build
@@ -119,20 +121,24 @@ print(json.dumps(sorted(sys.modules)))
 
 
 def imported_modules(engine: str) -> list[str]:
-    """Modules of the list FOREIGN that have been imported after a linear ride in a fresh process."""
-    command = [sys.executable, "-c", PROBE, engine]
+    """Modules of the list FOREIGN_MODULES that have been imported after a linear ride in a fresh process."""
+    command = [sys.executable, "-c", PROBE_SCRIPT, engine]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     modules = json.loads(done.stdout.splitlines()[-1])
-    return [name for name in FOREIGN if any(package == name or package.startswith(f"{name}.") for package in modules)]
+    return [
+        name
+        for name in FOREIGN_MODULES
+        if any(package == name or package.startswith(f"{name}.") for package in modules)
+    ]
 
 
 def states(filters: dict[str, str]) -> int:
     """Number of states of the vehicle R19-ride with two road filters and with weightings."""
-    vehicle = _linear("r19_ride")
-    return len(weighted(excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), filters).A)
+    vehicle = _linear_vehicle("r19_ride")
+    return len(system_with_weightings(vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), filters).A)
 
 
-def linearised(name: str) -> int:
+def count_of_linearisations(name: str) -> int:
     """Number of linear vehicles that a sweep over SPEEDS needs."""
     with mock.patch.object(of_scene, "linearise", wraps=linearise) as made:
         linear = of_scene.linear_vehicle(load_vehicle(name))
@@ -141,16 +147,16 @@ def linearised(name: str) -> int:
     return made.call_count
 
 
-def noisy(damping: float) -> int:
+def count_of_noisy_outputs(damping: float) -> int:
     """Number of the half car's outputs that white noise enters directly, with this tyre damping (N s/m)."""
     half_car = load_vehicle("half_car")
     damped = replace(half_car, tyres=tuple(replace(tyre, damping=damping) for tyre in half_car.tyres))
     vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
-    system = excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0])
+    system = vehicle_with_road(vehicle, paper_road(vehicle.wheels), SPEEDS[0])
     return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
 
 
-def callbacks(name: str) -> dict[str, tuple[int, int]]:
+def curve_and_callback_counts(name: str) -> dict[str, tuple[int, int]]:
     """Numbers of curves and of callbacks of a vehicle in both engines; Exudyn's are counted over the items of its
     system."""
     counts = {}
@@ -163,36 +169,36 @@ def callbacks(name: str) -> dict[str, tuple[int, int]]:
 
 
 @cache
-def _linear(name: str) -> LinearVehicle:
+def _linear_vehicle(name: str) -> LinearVehicle:
     return of_scene.linear_vehicle(load_vehicle(name))(SPEEDS[0])
 
 
 def rows(quick: bool = False) -> list[Row]:
     """Report rows on all counts, each next to a positive control. quick: without the imports of a fresh process."""
     names = ("quarter_car", "quarter_car_nonlinear")
-    bare, curved = (callbacks(name) for name in names)
+    bare, curved = (curve_and_callback_counts(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
     told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
     counted = () if quick else (len(imported_modules("reference")),)
     return [
         *(Observed("absent.ride.imports", SYSTEM, told, count, "").at_most(0, why, "none") for count in counted),
-        behaves(
+        behaviour_row(
             "absent.ride.states",
             SYSTEM,
             "number of states of R19-ride alone, with the filter Wk, and with Wk and Wd",
-            ", ".join(str(states(dict(FILTERS[:count]))) for count in range(3)),
+            ", ".join(str(states(dict(WEIGHTED_OUTPUTS[:count]))) for count in range(3)),
             "42, 50, 56",
             "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6",
         ),
-        behaves(
+        behaviour_row(
             "absent.ride.speed",
             SYSTEM,
             "number of linear vehicles that three speeds need, for R19-ride and for R19-free",
-            f"{linearised('r19_ride')}, {linearised('r19_free')}",
+            f"{count_of_linearisations('r19_ride')}, {count_of_linearisations('r19_free')}",
             "1, 3",
             "without side forces and drag nothing depends on the speed",
         ),
-        behaves(
+        behaviour_row(
             "absent.ride.curves",
             SYSTEM,
             "number of curves and callbacks of a quarter car, and of a quarter car with three curves",
@@ -200,11 +206,11 @@ def rows(quick: bool = False) -> list[Row]:
             "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
             "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own",
         ),
-        behaves(
+        behaviour_row(
             "absent.ride.noise",
             SYSTEM,
             "number of outputs of a half car that white noise reaches, with tyres without damping and with damping",
-            f"{noisy(0.0)}, {noisy(100.0)}",
+            f"{count_of_noisy_outputs(0.0)}, {count_of_noisy_outputs(100.0)}",
             "0, 2",
             "the road's rate goes through tyre damping alone",
         ),

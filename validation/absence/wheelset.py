@@ -13,9 +13,9 @@ from models.rail import equations as eq
 from models.rail import wheel_forces as forces
 from models.rail.eigenvalues import free_wheelset
 from models.rail.equations import Equations
-from models.rail.wheelset import CHOSEN, Wheelset
+from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
-from validation.common.rows import Row, System, behaves
+from validation.common.rows import Row, System, behaviour_row
 
 SYSTEM: System = "effects"
 SPEED, SHIFT = 60.0, 3e-3
@@ -57,11 +57,11 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
 def without_net(law: Any) -> str:
     """Returns "the same" if the wheelset's rates do not change by a bit when FASTSIM's grid is filled with NaN, else
     "no numbers"."""
-    equations = Equations(CHOSEN, SPEED, law, 11)
-    state, (speed, body, _), rails = equations.displaced(SHIFT), equations.parameters, equations.rails
+    equations = Equations(CHOSEN_WHEELSET, SPEED, law, 11)
+    state, (speed, body, _), rails = equations.displaced_state(SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
-    rates = np.empty(eq.STATES)
-    eq.rates(state, speed, body, forces.plain(rails), rates, equations.blank())
+    rates = np.empty(eq.STATE_COUNT)
+    eq.rates(state, speed, body, forces.plain_rails(rails), rates, equations.empty_contacts())
     return "the same" if rates.tobytes() == equations.rates(state).tobytes() else "no numbers"
 
 
@@ -77,9 +77,9 @@ def springs(wheelset: Wheelset) -> tuple[int, int]:
 
 def rows() -> list[Row]:
     """Report rows on all counts, each next to a positive control."""
-    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN, free_wheelset(CHOSEN))]
+    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN_WHEELSET, free_wheelset(CHOSEN_WHEELSET))]
     return [
-        behaves(
+        behaviour_row(
             "absent.wheelset.fastsim",
             SYSTEM,
             "rates of a wheelset while FASTSIM's net holds no numbers, with the linear law and with FASTSIM",
@@ -87,7 +87,7 @@ def rows() -> list[Row]:
             "the same, no numbers",
             "what is not read cannot spoil anything",
         ),
-        behaves(
+        behaviour_row(
             "absent.wheelset.suspension",
             SYSTEM,
             "number of spring-dampers in Exudyn and actuators in MuJoCo, for the chosen wheelset and for a free one",

@@ -15,7 +15,7 @@ from validation.adams_joints.motion import BodyMotion, Reaction, about_marker
 
 PLACE, TURN, VELOCITY, TURNING, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
 """Of a state (14,): centre, quaternion (scalar last), velocity, angular velocity, angle about the joint's axis."""
-BREAKS = 1e-9
+START_VELOCITY_TOLERANCE = 1e-9
 """m/s, rad/s: start velocities that no joint allows."""
 
 
@@ -33,7 +33,7 @@ class ConstrainedBody:
         state = np.concatenate([m.centre, [0.0, 0.0, 0.0, 1.0], m.velocity, m.turning, [0.0]])
         rows, _ = self._constraints(state)
         speed = rows @ state[7:13]
-        if speed.size and np.abs(speed).max() > BREAKS:
+        if speed.size and np.abs(speed).max() > START_VELOCITY_TOLERANCE:
             raise InputError("", "PART, V and W", speed.tolist(), "is no velocity that the joint allows at the start")
         return state
 
@@ -49,19 +49,19 @@ class ConstrainedBody:
                 -turning @ quaternion[:3],
             ]
         )
-        accelerations, _ = self.solved(state)
+        accelerations, _ = self.accelerations_and_reaction(state)
         about = self.joint_axes[2] @ turning
         return np.concatenate([state[VELOCITY], 0.5 * product, accelerations, [about]])
 
-    def solved(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
         centre."""
-        m, turned = self.mechanism, _matrix(state[TURN])
+        m, turned = self.mechanism, _rotation_matrix(state[TURN])
         inertia = turned @ m.inertia @ turned.T
         turning = state[TURNING]
         applied = self.springs(state)
         applied[:3] += m.mass * m.gravity
-        applied[3:] -= _cross(turning, inertia @ turning)
+        applied[3:] -= _vector_product(turning, inertia @ turning)
         rows, wanted = self._constraints(state)
         mass = np.zeros((6, 6))
         mass[:3, :3], mass[3:, 3:] = m.mass * np.eye(3), inertia
@@ -72,10 +72,10 @@ class ConstrainedBody:
 
     def springs(self, state: np.ndarray) -> np.ndarray:
         """Force and moment (6,) of all springs on the body about its centre."""
-        out, turned = np.zeros(6), _matrix(state[TURN])
+        out, turned = np.zeros(6), _rotation_matrix(state[TURN])
         for spring in self.mechanism.springs:
             if spring.turns:
-                law = spring.stiffness * (state[ANGLE] - spring.rest)
+                law = spring.stiffness * (state[ANGLE] - spring.free_length)
                 law += spring.damping * (self.joint_axes[2] @ state[TURNING])
                 out[3:] -= law * self.joint_axes[2]
                 continue
@@ -84,18 +84,18 @@ class ConstrainedBody:
             length = np.linalg.norm(apart)
             if length > 0.0:
                 along = apart / length
-                speed = along @ (state[VELOCITY] + _cross(state[TURNING], arm))
-                force = -(spring.stiffness * (length - spring.rest) + spring.damping * speed) * along
-                out += np.concatenate([force, _cross(arm, force)])
+                speed = along @ (state[VELOCITY] + _vector_product(state[TURNING], arm))
+                force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * along
+                out += np.concatenate([force, _vector_product(arm, force)])
         return out
 
     def _constraints(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
         kind, turning = self.mechanism.kind, state[TURNING]
-        turned = _matrix(state[TURN])
+        turned = _rotation_matrix(state[TURN])
         arm = turned @ self.arm
-        point = np.hstack([np.eye(3), -_skew(arm)])
-        bent = -_cross(turning, _cross(turning, arm))
+        point = np.hstack([np.eye(3), -_skew_matrix(arm)])
+        bent = -_vector_product(turning, _vector_product(turning, arm))
         turn, still = np.hstack([np.zeros((3, 3)), np.eye(3)]), np.zeros(3)
         axes = self.joint_axes
         if kind == "revolute":
@@ -108,12 +108,12 @@ class ConstrainedBody:
             return point, bent
         if kind == "universal":
             on_body = turned @ self.mechanism.body.axes[:, 2]
-            row = _cross(on_body, axes[2]) @ turn
-            swing = -axes[2] @ _cross(turning, _cross(turning, on_body))
+            row = _vector_product(on_body, axes[2]) @ turn
+            swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
             apart = state[PLACE] + arm - self.mechanism.ground.place
-            speed = state[VELOCITY] + _cross(turning, arm)
+            speed = state[VELOCITY] + _vector_product(turning, arm)
             return (apart @ point)[None], np.array([apart @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)
 
@@ -125,7 +125,7 @@ class ConstrainedBody:
     def marched(self, state: np.ndarray, steps: int, step: float) -> np.ndarray:
         """State after ``steps`` steps of length ``step`` (s)."""
         for _ in range(steps):
-            state = self._stepped(state, step)
+            state = self._after_step(state, step)
         return state
 
     def run(self, duration: float, step: float, stride: int) -> tuple[BodyMotion, Reaction]:
@@ -134,16 +134,16 @@ class ConstrainedBody:
         for k in range(round(duration / step) + 1):
             if k % stride == 0:
                 kept.append(state)
-            state = self._stepped(state, step)
-        return self._told(np.array(kept), step * stride)
+            state = self._after_step(state, step)
+        return self._motion_and_reaction(np.array(kept), step * stride)
 
-    def _stepped(self, state: np.ndarray, step: float) -> np.ndarray:
+    def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
         after = step_on(lambda _, here: self.rates(here), 0.0, state, step)
         after[TURN] /= np.linalg.norm(after[TURN])
         return after
 
-    def _told(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
-        solved = [self.solved(state) for state in states]
+    def _motion_and_reaction(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
+        solved = [self.accelerations_and_reaction(state) for state in states]
         accelerations = np.array([each[0] for each in solved])
         wrenches = np.array([wrench + self.springs(state) for (_, wrench), state in zip(solved, states, strict=True)])
         motion = BodyMotion(
@@ -151,27 +151,27 @@ class ConstrainedBody:
             states[:, PLACE],
             states[:, VELOCITY],
             accelerations[:, :3],
-            np.array([_matrix(state[TURN]) for state in states]),
+            np.array([_rotation_matrix(state[TURN]) for state in states]),
             states[:, TURNING],
             accelerations[:, 3:],
         )
         return motion, about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _vector_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Vector product of two vectors; numpy's takes ten times as long for so few numbers."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def _skew(vector: np.ndarray) -> np.ndarray:
+def _skew_matrix(vector: np.ndarray) -> np.ndarray:
     """Matrix of the vector product from the left."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _matrix(quaternion: np.ndarray) -> np.ndarray:
+def _rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
     """Rotation (3, 3) of a quaternion, scalar last; it is scaled to 1 here."""
     x, y, z, w = quaternion / np.sqrt(quaternion @ quaternion)
-    part = _skew(np.array([x, y, z]))
+    part = _skew_matrix(np.array([x, y, z]))
     return np.eye(3) + 2.0 * (w * part + part @ part)

@@ -20,11 +20,11 @@ from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_momentum
 from validation.adams_joints.spring_kernel import set_spring_forces, spring_forces, spring_table
 
-NEAREST = 0.05
+LEAST_COSINE = 0.05
 """Least cosine of the second of three hinges on the whole path."""
-BREAKS = 1e-9
+START_VELOCITY_TOLERANCE = 1e-9
 """m/s, rad/s: start velocities that the joint does not allow."""
-BODY = "body"
+BODY_NAME = "body"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class JointTree:
     def vehicle(self) -> SpatialVehicle:
         """Joints as massless bodies, then the body at its centre."""
         m = self.mechanism
-        ground, end = _vector(self.local(m.ground.place)), _vector(self.local(m.body.place))
+        ground, end = _vector_of(self.local(m.ground.place)), _vector_of(self.local(m.body.place))
         held = {
             "revolute": [Body("joint", 0.0, end, ("rz",))],
             "prismatic": [Body("joint", 0.0, end, ("z",))],
@@ -52,11 +52,11 @@ class JointTree:
                 Body("rod", 0.0, ground, ("rx", "ry")),
                 Body("joint", 0.0, end, ("rx", "ry", "rz"), parent="rod"),
             ],
-            "free": [Body("joint", 0.0, _vector(self.local(m.centre)), FREEDOMS)],
+            "free": [Body("joint", 0.0, _vector_of(self.local(m.centre)), FREEDOMS)],
         }[m.kind]
         inertia = self.axes.T @ m.inertia @ self.axes
-        rows = tuple(_vector(row) for row in 0.5 * (inertia + inertia.T))
-        body = Body(BODY, m.mass, _vector(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), held[-1].name)
+        rows = tuple(_vector_of(row) for row in 0.5 * (inertia + inertia.T))
+        body = Body(BODY_NAME, m.mass, _vector_of(self.local(m.centre)), (), (rows[0], rows[1], rows[2]), held[-1].name)
         return SpatialVehicle("mechanism", (*held, body), (), (), ())
 
     def driven(self) -> Driven:
@@ -71,7 +71,7 @@ class JointTree:
 
     def motion(self, times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
         """The body by coordinates, rates and accelerations (m, n) of the joints, in the axes of the ground."""
-        place, velocity, acceleration, turned, turning, spin_up = _walked(self.vehicle(), q, v, a)
+        place, velocity, acceleration, turned, turning, spin_up = _motion_of_last_body(self.vehicle(), q, v, a)
         out = self.axes.T
         return BodyMotion(
             times,
@@ -91,7 +91,7 @@ class JointTree:
         columns = np.hstack([each.velocity, each.turning]).T
         wanted = np.concatenate([self.mechanism.velocity, self.mechanism.turning])
         rates = np.linalg.lstsq(columns, wanted, rcond=None)[0]
-        if np.abs(columns @ rates - wanted).max() > BREAKS:
+        if np.abs(columns @ rates - wanted).max() > START_VELOCITY_TOLERANCE:
             raise InputError("", "PART, V and W", wanted.tolist(), "is no velocity that the joint allows at the start")
         return rates
 
@@ -111,15 +111,15 @@ class JointTree:
 def joint_tree(mechanism: Mechanism, path: BodyMotion) -> JointTree:
     """The joint chain whose hinges stay farthest from a singularity along a path; raises Refused where every chain
     comes too near."""
-    trees = [JointTree(mechanism, axes) for axes in _layouts(mechanism)]
+    trees = [JointTree(mechanism, axes) for axes in _candidate_axes(mechanism)]
     apart = [_least_hinge_cosine(tree, path) for tree in trees]
     best = int(np.argmax(apart))
-    if apart[best] < NEAREST:
+    if apart[best] < LEAST_COSINE:
         raise Refused("joint tree", "the body turns so far that two hinges of its ball fall into one in every layout")
     return trees[best]
 
 
-def _layouts(m: Mechanism) -> list[np.ndarray]:
+def _candidate_axes(m: Mechanism) -> list[np.ndarray]:
     """Candidate axes (3, 3) for the chain of joints, as columns."""
     if m.kind in ("revolute", "prismatic", "cylindrical"):
         return [m.ground.axes]
@@ -156,7 +156,9 @@ def _least_hinge_cosine(tree: JointTree, path: BodyMotion) -> float:
     return float(min(of_rod.min(), of_ball.min()))
 
 
-def _walked(vehicle: SpatialVehicle, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, ...]:
+def _motion_of_last_body(
+    vehicle: SpatialVehicle, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Motion of the last body of a chain in the vehicle's axes: position, velocity, acceleration (m, 3), rotation (m,
     3, 3), angular velocity and angular acceleration (m, 3). It is computed by relative motion from joint to joint."""
     count = len(q)
@@ -175,13 +177,13 @@ def _walked(vehicle: SpatialVehicle, q: np.ndarray, v: np.ndarray, a: np.ndarray
             speed, gain = speed + rate, gain + more + 2.0 * np.cross(w, rate)
         else:
             w, alpha = w + rate, alpha + more + np.cross(w, rate)
-            turned = turned @ _turns(kind % 3, q[:, j])
+            turned = turned @ _rotations_about(kind % 3, q[:, j])
     reach = turned @ (np.array(vehicle.bodies[-1].position) - origin)
     gain = gain + np.cross(alpha, reach) + np.cross(w, np.cross(w, reach))
     return x + reach, speed + np.cross(w, reach), gain, turned, w, alpha
 
 
-def _turns(axis: int, angle: np.ndarray) -> np.ndarray:
+def _rotations_about(axis: int, angle: np.ndarray) -> np.ndarray:
     """Rotations (m, 3, 3) about an axis by angles (m,)."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     turns = np.tile(np.eye(3), (len(angle), 1, 1))
@@ -191,6 +193,6 @@ def _turns(axis: int, angle: np.ndarray) -> np.ndarray:
     return turns
 
 
-def _vector(values: np.ndarray) -> Vector:
+def _vector_of(values: np.ndarray) -> Vector:
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -19,7 +19,7 @@ from models.core.errors import InputError
 from validation.adams_joints.model_file import Statement, read_statements
 
 Kind = Literal["revolute", "prismatic", "cylindrical", "spherical", "universal", "distance", "free"]
-JOINTS: dict[str, Kind] = {
+JOINT_KINDS: dict[str, Kind] = {
     "REVOLUTE": "revolute",
     "TRANSLATIONAL": "prismatic",
     "CYLINDRICAL": "cylindrical",
@@ -28,7 +28,7 @@ JOINTS: dict[str, Kind] = {
 }
 ASSEMBLY_TOLERANCE = 1e-6
 """m and rad within which a joint must be assembled at the start; angles in files have six digits or more."""
-NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
+NUMBER_PATTERN = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,8 @@ class Spring:
     """A spring and damper from the ground to the body.
 
     turns : about the joint's axis, or else along the line between both points. ground, body (3,): points at the start
-    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), rest : length (m) or angle (rad) without force.
+    (m). stiffness (N/m or N m/rad), damping (N s/m or N m s/rad), free_length : length (m) or angle (rad) without
+    force.
     """
 
     turns: bool
@@ -54,7 +55,7 @@ class Spring:
     body: np.ndarray
     stiffness: float
     damping: float
-    rest: float
+    free_length: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,19 +175,19 @@ class _Reading:
         (joint,) = joints
         if joint.name == "GCON":
             return self._distance(joint)
-        kind = next((kind for name, kind in JOINTS.items() if joint.has(name)), None)
+        kind = next((kind for name, kind in JOINT_KINDS.items() if joint.has(name)), None)
         if kind is None:
-            raise joint.refuse("", ", ".join(joint.values), "is not supported: " + ", ".join(JOINTS) + " are")
+            raise joint.refuse("", ", ".join(joint.values), "is not supported: " + ", ".join(JOINT_KINDS) + " are")
         ends = self.pair(joint, joint.whole("I"), joint.whole("J"))
         first = self.marker(joint, joint.whole("I"))
         if kind == "universal":
-            ends = _cross(*ends, first.part == self.ground.number)
+            ends = _crossed_markers(*ends, first.part == self.ground.number)
         _check_assembled(joint, kind, *ends)
         return kind, ends, 0.0
 
     def _distance(self, joint: Statement) -> tuple[Kind, tuple[Marker, Marker], float]:
         text = re.sub(r"\s", "", joint.text("FUNCTION")).upper()
-        match = re.fullmatch(r"DM\((\d+),(\d+)\)-" + NUMBER, text)
+        match = re.fullmatch(r"DM\((\d+),(\d+)\)-" + NUMBER_PATTERN, text)
         if match is None:
             raise joint.refuse(", FUNCTION", text, "is not supported: only DM(marker, marker) - length")
         ends, length = self.pair(joint, int(match[1]), int(match[2])), float(match[3])
@@ -198,7 +199,7 @@ class _Reading:
     def _spring(self, statement: Statement, kind: Kind, joint: Marker) -> Spring:
         ground, body = self.pair(statement, statement.whole("I"), statement.whole("J"))
         turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
-        if turns and not (kind == "revolute" and _parallel(ground.axes[:, 2], joint.axes[:, 2])):
+        if turns and not (kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
             raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
         law = self._sprung(statement, turns) if statement.name == "SPRINGDAMPER" else self._function(statement, turns)
         angle = 0.0
@@ -225,7 +226,7 @@ class _Reading:
         if not turns:
             travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
         plain = re.sub(rate, "(rate)", re.sub(travel, "(travel)", text))
-        force = _evaluated(statement, plain)
+        force = _evaluated_expression(statement, plain)
         base, k, c = force(0.0, 0.0), force(1.0, 0.0), force(0.0, 1.0)
         stiffness, damping = base - k, base - c
         if abs(force(2.0, 3.0) - (base - 2.0 * stiffness - 3.0 * damping)) > 1e-9 * (abs(stiffness) + abs(damping)):
@@ -238,7 +239,7 @@ class _Reading:
         return stiffness, damping, -rest if turns else rest  # az is the angle of the ground beside the body
 
 
-def _evaluated(statement: Statement, text: str) -> Callable[[float, float], float]:
+def _evaluated_expression(statement: Statement, text: str) -> Callable[[float, float], float]:
     """Value of an expression as a function of travel and rate; it may contain numbers, RTOD and DTOR."""
     names = {"rtod": 180.0 / math.pi, "dtor": math.pi / 180.0, "pi": math.pi}
     try:
@@ -260,11 +261,11 @@ def _turned_axes(angles: np.ndarray) -> np.ndarray:
     return Rotation.from_euler("ZXZ", angles).as_matrix()
 
 
-def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
+def _are_parallel(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(np.linalg.norm(np.cross(a, b)) < ASSEMBLY_TOLERANCE)
 
 
-def _cross(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
+def _crossed_markers(ground: Marker, body: Marker, ground_first: bool) -> tuple[Marker, Marker]:
     """Both markers of a universal joint, turned so that their z axes are the arms of the cross: the x axis of the I
     marker, and the y axis of the J marker."""
     of_ground, of_body = (0, 1) if ground_first else (1, 0)
@@ -283,5 +284,5 @@ def _check_assembled(joint: Statement, kind: Kind, ground: Marker, body: Marker)
     if kind == "universal":
         if abs(z @ body.axes[:, 2]) > ASSEMBLY_TOLERANCE:
             raise joint.refuse("", None, "has arms that are not square to each other at the start")
-    elif kind != "spherical" and not (_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
+    elif kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
         raise joint.refuse("", None, "has z axes that are not parallel at the start")

@@ -15,7 +15,7 @@ from models.core.errors import InputError
 
 IGNORED_STATEMENTS = ("ADAMS", "GRAPHICS", "REQUEST", "OUTPUT", "RESULTS", "VARIABLE", "END", "LIST", "INTEGRATOR")
 """Statements that change no motion; a force that reads a VARIABLE is refused where it names it."""
-KEYS = {
+KEYS_OF_STATEMENT = {
     "UNITS": ("FORCE", "MASS", "LENGTH", "TIME"),
     "PART": ("GROUND", "MASS", "CM", "IP", "QG", "REULER", "VX", "VY", "VZ", "WX", "WY", "WZ"),
     "MARKER": ("PART", "QP", "REULER"),
@@ -26,9 +26,9 @@ KEYS = {
     "ACCGRAV": ("IGRAV", "JGRAV", "KGRAV"),
 }
 """Statements that are read, and what each may say."""
-SI = {"FORCE": "NEWTON", "MASS": "KILOGRAM", "LENGTH": "METER", "TIME": "SECOND"}
-_HEAD = re.compile(r"\s*([A-Za-z_]+)\s*/\s*(\d*)\s*(?:,|$|\b)(.*)", re.DOTALL)
-_KEY = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
+SI_UNITS = {"FORCE": "NEWTON", "MASS": "KILOGRAM", "LENGTH": "METER", "TIME": "SECOND"}
+_STATEMENT_PATTERN = re.compile(r"\s*([A-Za-z_]+)\s*/\s*(\d*)\s*(?:,|$|\b)(.*)", re.DOTALL)
+_KEY_PATTERN = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,17 @@ def read_statements(path: str | Path) -> list[Statement]:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
         raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
-    statements = [_statement(str(path), number, text) for number, text in _statements(lines) if not _passed(text)]
+    statements = [
+        _parsed_statement(str(path), number, text) for number, text in _statement_texts(lines) if not _is_skipped(text)
+    ]
     for statement in (each for each in statements if each.name == "UNITS"):
         for key, (value, *_) in statement.values.items():
-            if value.upper() != SI[key]:
-                raise statement.refuse(f", {key}", value, f"is not supported: only {SI[key]}")
+            if value.upper() != SI_UNITS[key]:
+                raise statement.refuse(f", {key}", value, f"is not supported: only {SI_UNITS[key]}")
     return statements
 
 
-def _statements(lines: list[str]) -> list[tuple[int, str]]:
+def _statement_texts(lines: list[str]) -> list[tuple[int, str]]:
     """Number of the first line and text of every statement."""
     joined: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
@@ -106,31 +108,33 @@ def _statements(lines: list[str]) -> list[tuple[int, str]]:
     return joined
 
 
-def _passed(text: str) -> bool:
+def _is_skipped(text: str) -> bool:
     return re.split(r"[\s/,]", text.upper(), maxsplit=1)[0] in IGNORED_STATEMENTS
 
 
-def _statement(file: str, line_number: int, text: str) -> Statement:
-    head = _HEAD.fullmatch(text)
+def _parsed_statement(file: str, line_number: int, text: str) -> Statement:
+    head = _STATEMENT_PATTERN.fullmatch(text)
     name = head.group(1).upper() if head else ""
-    if head is None or name not in KEYS:
-        raise InputError(file, f"line {line_number}", text[:40], f"is not supported; read are {', '.join(KEYS)}")
+    if head is None or name not in KEYS_OF_STATEMENT:
+        raise InputError(
+            file, f"line {line_number}", text[:40], f"is not supported; read are {', '.join(KEYS_OF_STATEMENT)}"
+        )
     values: dict[str, list[str]] = {}
     key = ""
     for part in _between_commas(head.group(3)):
-        named = _KEY.fullmatch(part)
+        named = _KEY_PATTERN.fullmatch(part)
         if named:
             key = named.group(1).upper()
             values[key] = [named.group(2).strip()]
-        elif part.strip().upper() in KEYS[name]:
+        elif part.strip().upper() in KEYS_OF_STATEMENT[name]:
             values[part.strip().upper()] = []
         elif key:
             values[key].append(part.strip())
         elif part.strip():
             values[part.strip().upper()] = []
     statement = Statement(file, line_number, name, int(head.group(2) or 0), values)
-    for unknown in (each for each in values if each not in KEYS[name]):
-        raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS[name])}")
+    for unknown in (each for each in values if each not in KEYS_OF_STATEMENT[name]):
+        raise statement.refuse(f", {unknown}", None, f"is not supported; read are {', '.join(KEYS_OF_STATEMENT[name])}")
     return statement
 
 

@@ -12,14 +12,14 @@ from models.core.errors import InputError
 from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_momentum
 
-CONTENT = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, "Rforce": 3, "Rtorque": 3}
+COLUMN_GROUPS = {"Pos": 3, "Quat": 4, "Vel": 3, "Avel": 3, "Acc": 3, "Aacc": 3, "Rforce": 3, "Rtorque": 3}
 """Groups of columns, numbered from 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutputFile:
-    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in CONTENT; digits: number of
-    significant digits in the file."""
+    """Table of an output file. times (m,) s; columns: arrays (m, 3 or 4) by group, as in COLUMN_GROUPS; digits: number
+    of significant digits in the file."""
 
     times: np.ndarray
     columns: dict[str, np.ndarray]
@@ -68,7 +68,7 @@ def read_output(path: str | Path) -> OutputFile:
             names, *rows = csv.reader(file)
     except (OSError, ValueError) as error:
         raise InputError(path, "", None, f"the file cannot be read: {error}") from None
-    groups = {group: [f"{group}{k + 1}" for k in range(count)] for group, count in CONTENT.items()}
+    groups = {group: [f"{group}{k + 1}" for k in range(count)] for group, count in COLUMN_GROUPS.items()}
     missing = [name for each in (["time"], *groups.values()) for name in each if name not in names]
     if missing:
         raise InputError(path, "header", missing[0], "is missing")
@@ -76,12 +76,12 @@ def read_output(path: str | Path) -> OutputFile:
         table = np.array(rows, float)
     except ValueError as error:
         raise InputError(path, "rows", None, f"must hold a number in every column: {error}") from None
-    digits = max(_digits(cell) for row in rows for cell in row)
+    digits = max(_significant_digits(cell) for row in rows for cell in row)
     columns = {group: table[:, [names.index(name) for name in each]] for group, each in groups.items()}
     return OutputFile(table[:, names.index("time")], columns, digits)
 
 
-def _digits(cell: str) -> int:
+def _significant_digits(cell: str) -> int:
     """Significant digits of a number as it is written."""
     return len(cell.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
 

@@ -31,7 +31,14 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
     last, origin = anchor(vehicle, vehicle.bodies[-1].name)
     laws = [
-        [last if each.turns else -1, each.stiffness, each.damping, each.rest, *each.ground, *(each.body - origin)]
+        [
+            last if each.turns else -1,
+            each.stiffness,
+            each.damping,
+            each.free_length,
+            *each.ground,
+            *(each.body - origin),
+        ]
         for each in springs
     ]
     return np.concatenate([[len(rows), len(laws)], rows.ravel(), np.array(laws).ravel()])

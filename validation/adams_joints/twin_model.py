@@ -17,7 +17,7 @@ from models.own_model.path import file_path
 from models.own_model.reading import TwinModel
 from validation.adams_joints.mechanism import Mechanism, Spring
 
-STATES = 20
+STATE_COUNT = 20
 SLIDE, HINGE = "slide", "hinge"
 
 
@@ -27,18 +27,21 @@ def as_mjcf(mechanism: Mechanism) -> str:
     laws = [spring for spring in m.springs if spring.turns]
     lines = [spring for spring in m.springs if not spring.turns]
     six = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
-    feet = "".join(f'<site name="foot {i}" pos="{_row(spring.ground)}"/>' for i, spring in enumerate(lines))
-    tips = "".join(f'<site name="tip {i}" pos="{_row(spring.body - m.centre)}"/>' for i, spring in enumerate(lines))
-    tendons = "".join(_tendon(i, spring) for i, spring in enumerate(lines))
+    feet = "".join(f'<site name="foot {i}" pos="{_numbers_text(spring.ground)}"/>' for i, spring in enumerate(lines))
+    tips = "".join(
+        f'<site name="tip {i}" pos="{_numbers_text(spring.body - m.centre)}"/>' for i, spring in enumerate(lines)
+    )
+    tendons = "".join(_tendon_text(i, spring) for i, spring in enumerate(lines))
     return (
-        f'<mujoco><compiler angle="radian"/><option gravity="{_row(m.gravity)}"/><worldbody>{feet}'
-        f'<body name="body" pos="{_row(m.centre)}">{_joints(m, laws)}'
-        f'<inertial pos="0 0 0" mass="{m.mass!r}" fullinertia="{_row(np.array(six))}"/>{tips}</body></worldbody>'
+        f'<mujoco><compiler angle="radian"/><option gravity="{_numbers_text(m.gravity)}"/><worldbody>{feet}'
+        f'<body name="body" pos="{_numbers_text(m.centre)}">{_joints(m, laws)}'
+        f'<inertial pos="0 0 0" mass="{m.mass!r}" '
+        f'fullinertia="{_numbers_text(np.array(six))}"/>{tips}</body></worldbody>'
         f"<tendon>{tendons}</tendon></mujoco>"
     )
 
 
-def _row(numbers: np.ndarray) -> str:
+def _numbers_text(numbers: np.ndarray) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
@@ -55,34 +58,36 @@ def _joints(m: Mechanism, laws: list[Spring]) -> str:
     }
     if m.kind not in kinds:
         raise Refused(m.kind, "its rod has no mass, and MuJoCo's parser takes no moving body without")
-    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.rest!r}"' for s in laws)
+    law = "".join(f' stiffness="{s.stiffness!r}" damping="{s.damping!r}" springref="{s.free_length!r}"' for s in laws)
     anchor = m.body.place - m.centre
     return "".join(
         f'<joint name="{kind} {i}" type="{kind}"/>'
         if kind == "free"
-        else f'<joint name="{kind} {i}" type="{kind}" axis="{_row(axis)}" pos="{_row(anchor)}"{law}/>'
+        else f'<joint name="{kind} {i}" type="{kind}" axis="{_numbers_text(axis)}" pos="{_numbers_text(anchor)}"{law}/>'
         for i, (kind, axis) in enumerate(kinds[m.kind])
     )
 
 
-def _tendon(i: int, spring: Spring) -> str:
-    law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.rest!r}"'
+def _tendon_text(i: int, spring: Spring) -> str:
+    law = f'stiffness="{spring.stiffness!r}" damping="{spring.damping!r}" springlength="{spring.free_length!r}"'
     return f'<spatial name="spring {i}" {law}><site site="foot {i}"/><site site="tip {i}"/></spatial>'
 
 
-def examined(mechanism: Mechanism, folder: Path, steps: int, step: float) -> tuple[float, dict[str, np.ndarray]]:
+def build_differences(
+    mechanism: Mechanism, folder: Path, steps: int, step: float
+) -> tuple[float, dict[str, np.ndarray]]:
     """Largest relative difference between the accelerations of all builds and those of the file. Paths (steps + 1, 3)
     of the centre: by the file's own model in MuJoCo and by Exudyn's build, with steps of ``step`` (s) from the start.
     """
     path = folder / "joint.xml"
     path.write_text(as_mjcf(mechanism), encoding="utf-8")
     twin = read(path).twin
-    worst = max(row.acceleration for row in certificate(twin, STATES))
+    worst = max(row.acceleration for row in certificate(twin, STATE_COUNT))
     start = np.zeros(twin.size), _start_rates(mechanism, twin)
     n, built = twin.size, free_model("exudyn", twin.driven).march(*start, steps, step)
     in_engine = [twin.coordinates.to_mujoco(row[:n], row[n:]).qpos for row in built]
     in_file = file_path(twin, start, (steps, step))[:, : twin.model.nq]
-    return worst, {"mujoco": _centres(twin, in_file), "exudyn": _centres(twin, np.array(in_engine))}
+    return worst, {"mujoco": _body_centres(twin, in_file), "exudyn": _body_centres(twin, np.array(in_engine))}
 
 
 def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
@@ -96,7 +101,7 @@ def _start_rates(mechanism: Mechanism, twin: TwinModel) -> np.ndarray:
     return rates
 
 
-def _centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
+def _body_centres(twin: TwinModel, positions: np.ndarray) -> np.ndarray:
     """Positions (m, 3) of the body's centre at MuJoCo's coordinates (m, nq)."""
     data, places = mujoco.MjData(twin.model), np.empty((len(positions), 3))
     for place, data.qpos[:] in zip(places, positions, strict=True):

@@ -28,26 +28,35 @@ from models.core.result import provenance
 from models.core.whole_files import write_whole
 from validation.blind_spots import memory
 from validation.blind_spots.rewriting import ROOT, can_be_spoiled
-from validation.blind_spots.shared import candidates, compiled_functions, shared_functions
-from validation.blind_spots.sides import Run, runs, sides
-from validation.blind_spots.table import JOINED, NOT_AUDITED, Line, is_independent, kind_of, read, uncovered, write
+from validation.blind_spots.shared import candidate_functions, compiled_functions, shared_functions
+from validation.blind_spots.sides import Run, engines_of_functions, runs_to_trace
+from validation.blind_spots.table import (
+    LIST_SEPARATOR,
+    NOT_AUDITED,
+    Line,
+    is_independent,
+    kind_of,
+    read,
+    uncovered_functions,
+    write,
+)
 from validation.cases import CASES
 
-STARTUP = Path(__file__).with_name("startup")
+STARTUP_SCRIPT = Path(__file__).with_name("startup")
 TRACE, FUNCTIONS, TABLE = "trace", "functions.json", "blind_spots.csv"
-JUDGES, OTHERS = "judges.csv", "others.csv"
-UNJUDGED = ("cost", "effects")
+JUDGES_FILE, OTHERS_FILE = "judges.csv", "others.csv"
+UNJUDGING_SYSTEMS = ("cost", "effects")
 """Systems whose cases judge effort and choices: what they see of a value, the others see before."""
-LAWS = ("tyre", "contact", "rail", "brake", "road", "sensors", "multibody", "vehicles", "ride")
+LAW_FOLDERS = ("tyre", "contact", "rail", "brake", "road", "sensors", "multibody", "vehicles", "ride")
 """Folders whose functions come first: the laws of physics, and the tables that hold their numbers."""
-WORKERS = 2
-BUDGETS = (8.0, 40.0)
+WORKER_COUNT = 2
+SECONDS_BUDGETS = (8.0, 40.0)
 """Seconds of the processor, without compiling, after which no other case or test is run for a function: if something
 independent has noticed, and if not. How many are left is told."""
-FAULT = 0.01
-PATIENCE = 1200
+FAULT_SIZE = 0.01
+LONGEST_SOUND_CASE = 1200
 """Seconds of the processor after which a case or test without a fault has lost its way."""
-LOST = 120
+LONGEST_FAULTY_CASE = 120
 """Seconds of the processor after which one with a fault has, as a stop whose wheels never come to rest."""
 Told = dict[str, Any]
 Noticed = tuple[str, str, str]
@@ -114,7 +123,7 @@ class Probes:
     """Pool of worker processes that run jobs (``validation.blind_spots.probe``). ``folder`` keeps their compiled
     code."""
 
-    def __init__(self, folder: Path, workers: int = WORKERS) -> None:
+    def __init__(self, folder: Path, workers: int = WORKER_COUNT) -> None:
         self.workers = min(workers, os.cpu_count() or 1)
         self.folder, self.idle = folder, Queue[subprocess.Popen[str]]()
         self._place = TemporaryDirectory()
@@ -145,7 +154,11 @@ class Probes:
         error). Returns how the job ended."""
         out.write_text("")
         told: Told = {**job._asdict(), "out": str(out), "faults": faults, "sound": sorted(sound)}
-        told |= {"patience": LOST, "budgets": BUDGETS} if faults else {"patience": PATIENCE, "budgets": [PATIENCE] * 2}
+        told |= (
+            {"patience": LONGEST_FAULTY_CASE, "budgets": SECONDS_BUDGETS}
+            if faults
+            else {"patience": LONGEST_SOUND_CASE, "budgets": [LONGEST_SOUND_CASE] * 2}
+        )
         probe = self.idle.get()
         assert probe.stdin and probe.stdout
         probe.stdin.write(json.dumps(told) + "\n")
@@ -172,18 +185,20 @@ class Asked:
         """Plant a fault in one function, run the checks in which it gives numbers, and return the line that says which
         of them notice the fault."""
         traced = self.traced
-        callers, ended = traced.callers(function, self.judges), unspoiled(function, traced)
+        callers, ended = traced.callers(function, self.judges), unspoiled_reason(function, traced)
         if ended or not callers:
             return self.line(function, ended or "whole", len(callers), len(callers))
         job = Job([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
         with TemporaryDirectory() as place:
             out = Path(place) / "told.jsonl"
-            ended = self.probes.run(job, out, {traced.functions.index(function): FAULT}, traced.sound)
+            ended = self.probes.run(job, out, {traced.functions.index(function): FAULT_SIZE}, traced.sound)
             told = lines_of(out)
-        rows, tests = ([each for each in kind(told) if each[0] not in traced.sound] for kind in (_rows, _tests))
+        rows, tests = (
+            [each for each in kind(told) if each[0] not in traced.sound] for kind in (_failed_rows, _failed_tests)
+        )
         independent = [id for id, grounds in (*rows, *tests) if is_independent(id, grounds)]
         ids = ({id for id, _ in rows}, {id for id, _ in tests}, {*independent})
-        noticed, failed, grounded = (JOINED.join(sorted(each)) for each in ids)
+        noticed, failed, grounded = (LIST_SEPARATOR.join(sorted(each)) for each in ids)
         left = len(callers) - len(told)
         return self.line(function, ended, len(callers), left, (noticed, failed, grounded))
 
@@ -204,18 +219,18 @@ def audit(folder: Path, progress: Progress) -> list[Line]:
         engines = trace_of_sides(probes, functions, progress)
         traced = trace(probes, functions, jobs(with_grounds=True), progress)
         shared = in_order(shared_functions(engines))
-        lines = measured(folder / JUDGES, shared, Asked(probes, traced, True, engines), progress)
+        lines = measured(folder / JUDGES_FILE, shared, Asked(probes, traced, True, engines), progress)
         write(lines.values(), folder / TABLE)
         traced = trace(probes, functions, jobs(with_grounds=False), progress)
         doubtful = [name for name in shared if not lines[name].is_covered]
-        more = measured(folder / OTHERS, doubtful, Asked(probes, traced, False, engines), progress)
+        more = measured(folder / OTHERS_FILE, doubtful, Asked(probes, traced, False, engines), progress)
     whole = [lines[name].with_others(more[name]) for name in doubtful]
     whole += [line for name, line in lines.items() if name not in doubtful]
     write(whole, folder / TABLE)
     return whole
 
 
-def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers: int = WORKERS) -> list[Line]:
+def audit_of(only: str, folder: Path, progress: Progress, by: str = "*", workers: int = WORKER_COUNT) -> list[Line]:
     """Audit the shared functions whose ``module:name`` matches ``only``, by judges alone; returns their lines.
 
     by : what the names of the cases and test files that are asked are like; the fewer, the shorter the trace. Raises
@@ -256,15 +271,15 @@ def in_order(functions: list[str]) -> list[str]:
 
     def rank(function: str) -> tuple[bool, int]:
         folder = function.split(".")[1]
-        return function not in compiled, LAWS.index(folder) if folder in LAWS else len(LAWS)
+        return function not in compiled, LAW_FOLDERS.index(folder) if folder in LAW_FOLDERS else len(LAW_FOLDERS)
 
     return sorted(functions, key=rank)
 
 
-def summary(lines: list[Line], folder: Path) -> list[str]:
+def audit_summary(lines: list[Line], folder: Path) -> list[str]:
     """Printed summary of an audit: counts, then each function whose fault no independent check notices."""
     text = [f"{len(lines)} functions, {sum(line.is_covered for line in lines)} noticed by something independent"]
-    for kind, names in uncovered(lines, [line.function for line in lines]).items():
+    for kind, names in uncovered_functions(lines, [line.function for line in lines]).items():
         text += [f"{kind}:", *(f"  {name}" for name in names)]
     return [*text, f"table: {folder / TABLE}"]
 
@@ -272,7 +287,7 @@ def summary(lines: list[Line], folder: Path) -> list[str]:
 def judged_cases() -> list[str]:
     """Names of the cases whose rows judge values."""
     systems = {name: getattr(import_module(f"validation.cases.{name}"), "SYSTEM", "") for name in CASES}
-    return [name for name, system in systems.items() if system not in UNJUDGED]
+    return [name for name, system in systems.items() if system not in UNJUDGING_SYSTEMS]
 
 
 def prepare(folder: Path, only: str = "*") -> list[str]:
@@ -282,7 +297,7 @@ def prepare(folder: Path, only: str = "*") -> list[str]:
     Raises InputError where there are none, or where the folder holds others.
     """
     (folder / TRACE).mkdir(parents=True, exist_ok=True)
-    path, functions = folder / FUNCTIONS, [name for name in candidates() if fnmatchcase(name, only)]
+    path, functions = folder / FUNCTIONS, [name for name in candidate_functions() if fnmatchcase(name, only)]
     if not functions:
         raise InputError("--only", "", only, "no shared function is called so: module:name, as in 'models.tyre.*'")
     if path.is_file() and json.loads(path.read_text()) != functions:
@@ -309,7 +324,9 @@ def trace_of_sides(probes: Probes, functions: list[str], progress: Progress) -> 
     """Engines that share each Python function, by its name. Nothing is run where all functions are compiled."""
     if {*functions} <= {*compiled_functions()}:
         return {}
-    return sides(traced_lines(probes, functions, [Job([], [], [run]) for run in runs()], progress))
+    return engines_of_functions(
+        traced_lines(probes, functions, [Job([], [], [run]) for run in runs_to_trace()], progress)
+    )
 
 
 def traced_lines(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> list[Told]:
@@ -346,13 +363,13 @@ def environment(folder: Path, doubles: Path) -> dict[str, str]:
     order = {"functions": str(place / FUNCTIONS), "bytecode": str(place / "bytecode"), "memory": str(doubles)}
     return {
         **os.environ,
-        "PYTHONPATH": os.pathsep.join([str(STARTUP), str(ROOT)]),
+        "PYTHONPATH": os.pathsep.join([str(STARTUP_SCRIPT), str(ROOT)]),
         "NUMBA_CACHE_DIR": str(place / "machine_code"),
-        memory.VARIABLE: json.dumps(order),
+        memory.ENVIRONMENT_VARIABLE: json.dumps(order),
     }
 
 
-def unspoiled(function: str, traced: Traced) -> str:
+def unspoiled_reason(function: str, traced: Traced) -> str:
     """Reason why no 1 % fault can be planted in a function, in the words of ``Line.ended``; "" where it can."""
     if not can_be_spoiled(*function.split(":")):
         return "not spoiled"
@@ -361,7 +378,7 @@ def unspoiled(function: str, traced: Traced) -> str:
     return "no numbers" if any(function in item["ran"] for item in traced.items.values()) else "not run"
 
 
-def _rows(told: list[Told]) -> Iterator[tuple[str, str]]:
+def _failed_rows(told: list[Told]) -> Iterator[tuple[str, str]]:
     """Failed rows of the log: id and grounds of each."""
     for line in told:
         for row in line.get("rows", ()):
@@ -369,6 +386,6 @@ def _rows(told: list[Told]) -> Iterator[tuple[str, str]]:
                 yield row["id"], row["independence"]
 
 
-def _tests(told: list[Told]) -> Iterator[tuple[str, str]]:
+def _failed_tests(told: list[Told]) -> Iterator[tuple[str, str]]:
     """Failed tests of the log: id and grounds of each."""
     return ((line["test"], line["grounds"]) for line in told if line.get("failed"))

@@ -9,21 +9,21 @@ from numba import types
 from numba.core.targetconfig import ConfigStack
 from numba.extending import intrinsic, overload
 
-from validation.blind_spots.memory import ADDRESS, PLACES, SYMBOL
+from validation.blind_spots.memory import ADDRESS, ADDRESS_SYMBOL, MOST_FUNCTIONS
 from validation.blind_spots.spoiling import put, scaled, spoiled
 
 _intrinsic: Any = intrinsic
-llvmlite.binding.add_symbol(SYMBOL, ADDRESS)
+llvmlite.binding.add_symbol(ADDRESS_SYMBOL, ADDRESS)
 
 
 def _pointer(builder: Any, row: int, place: Any) -> Any:
     """Address of a function's entry in a row of ``memory`` (faults, functions that ran, functions that gave
     numbers)."""
     double = ir.DoubleType()
-    rows = builder.module.globals.get(SYMBOL)
-    rows = rows or ir.GlobalVariable(builder.module, ir.ArrayType(double, 3 * PLACES), SYMBOL)
+    rows = builder.module.globals.get(ADDRESS_SYMBOL)
+    rows = rows or ir.GlobalVariable(builder.module, ir.ArrayType(double, 3 * MOST_FUNCTIONS), ADDRESS_SYMBOL)
     whole = ir.IntType(64)
-    return builder.gep(rows, [whole(0), builder.add(place, whole(row * PLACES))])
+    return builder.gep(rows, [whole(0), builder.add(place, whole(row * MOST_FUNCTIONS))])
 
 
 @_intrinsic

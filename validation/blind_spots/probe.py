@@ -25,14 +25,14 @@ from numba.core import event
 
 from validation.blind_spots import memory
 from validation.blind_spots.rewriting import ROOT
-from validation.blind_spots.shared import modules
-from validation.blind_spots.sides import Run, prepared
+from validation.blind_spots.shared import all_modules
+from validation.blind_spots.sides import Run, prepared_scene
 from validation.blind_spots.table import is_independent
 
-IMPORT = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", re.MULTILINE)
+IMPORT_PATTERN = re.compile(r"^(?:from|import) ((?:models|validation|studies)[.\w]*)", re.MULTILINE)
 
 
-def clock() -> float:
+def processor_time() -> float:
     """Processor time (s) of this process and of its ended child processes."""
     return sum(os.times()[:4])
 
@@ -45,13 +45,13 @@ class Compiling(event.Listener):
 
     def on_start(self, event: Any) -> None:
         """numba starts to compile, perhaps within another compilation."""
-        self.start = clock() if self.depth == 0 else self.start
+        self.start = processor_time() if self.depth == 0 else self.start
         self.depth += 1
 
     def on_end(self, event: Any) -> None:
         """numba has finished a compilation."""
         self.depth -= 1
-        self.seconds += clock() - self.start if self.depth == 0 else 0.0
+        self.seconds += processor_time() - self.start if self.depth == 0 else 0.0
 
 
 class Told:
@@ -67,7 +67,7 @@ class Told:
 
     def clock(self) -> float:
         """Processor time (s) so far without numba's compilations."""
-        return clock() - self.compiling.seconds
+        return processor_time() - self.compiling.seconds
 
     def is_enough(self) -> bool:
         """Whether the job has used up its budget of processor time."""
@@ -81,7 +81,10 @@ class Told:
     def end(self, line: dict[str, Any], failed: list[tuple[str, str]]) -> None:
         """Record that a case or test has ended; failed: ids and grounds of what failed."""
         self.noticed |= any(id not in self.sound and is_independent(id, grounds) for id, grounds in failed)
-        line |= {"ran": memory.places(memory.RAN), "numbers": memory.places(memory.NUMBERS)}
+        line |= {
+            "ran": memory.nonzero_functions(memory.FUNCTIONS_THAT_RAN),
+            "numbers": memory.nonzero_functions(memory.FUNCTIONS_WITH_NUMBERS),
+        }
         line |= {"seconds": self.clock() - self.start, "refused": self.refused}
         with self.out.open("a") as file:
             file.write(json.dumps(line) + "\n")
@@ -89,13 +92,13 @@ class Told:
 
 def run_case(name: str, log: Told) -> None:
     """Run the quick share of a case and log it; a case that raises an error counts as one failed row."""
-    from validation.common.rows import rested
+    from validation.common.rows import rows_on_grounds
 
     log.begin()
     try:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            rows, _ = rested(name, lambda: case.measure(True, Path(folder)))
+            rows, _ = rows_on_grounds(name, lambda: case.measure(True, Path(folder)))
         lines: list[dict[str, str]] = [
             {"id": row.id, "status": row.status, "independence": row.independence} for row in rows
         ]
@@ -110,7 +113,7 @@ def run_scene(scene: str, engine: str, log: Told) -> None:
     """Run a scene in an engine and log it; functions of a refused or failed run do not count as shared."""
     from models.systems import run
 
-    read = prepared(scene)
+    read = prepared_scene(scene)
     log.begin()
     with suppress(Exception):
         run(read, engine)
@@ -180,16 +183,22 @@ def work(job: dict[str, Any]) -> None:
 def imported_by(tests: list[str]) -> list[str]:
     """Modules that test files import at their top level; the tests are given as pytest's arguments."""
     files = dict.fromkeys(test.partition("::")[0] for test in tests)
-    return list(dict.fromkeys(name for file in files for name in IMPORT.findall((ROOT / file).read_text("utf-8"))))
+    return list(
+        dict.fromkeys(name for file in files for name in IMPORT_PATTERN.findall((ROOT / file).read_text("utf-8")))
+    )
 
 
 def imported_by_runs(runs: list[Run]) -> list[str]:
     """Modules to import before scenes are run: all systems and engines; none if the job has no runs."""
-    return sorted(name for name in modules() if name.startswith(("models.systems.", "models.engines."))) if runs else []
+    return (
+        sorted(name for name in all_modules() if name.startswith(("models.systems.", "models.engines.")))
+        if runs
+        else []
+    )
 
 
-def ended(job: dict[str, Any]) -> str:
-    """Run a job in a forked process; returns how it ended, in the words of ``Line.ended``."""
+def run_in_fork(job: dict[str, Any]) -> str:
+    """Run a job in a forked process; returns how it ended, in the words of ``Line.run_in_fork``."""
     memory.clear(memory.FAULTS)
     named = [f"validation.cases.{name}" for name in job["cases"]]
     for module in [*named, *imported_by(job["tests"]), *imported_by_runs(job["runs"])]:
@@ -212,7 +221,7 @@ def main() -> None:
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)
     for line in sys.stdin:
-        print(ended(json.loads(line)), file=answers, flush=True)
+        print(run_in_fork(json.loads(line)), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -18,10 +18,10 @@ ROOT = Path(__file__).parents[2]
 SPOILED, SCALED, PUT = "_spoiled_by_audit", "_scaled_by_audit", "_put_by_audit"
 HELPERS = {"spoiled": SPOILED, "scaled": SCALED, "put": PUT}
 """Functions of ``spoiling``, and their names in a rewritten module."""
-COMPILES = re.compile(r"\bnumba\b|machine\.compiled")
+COMPILER_PATTERN = re.compile(r"\bnumba\b|machine\.compiled")
 """What the source of a module names that compiles functions."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-VIEWS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
+VIEW_FUNCTIONS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
 """Functions that give a view of their first argument: those of ``models.machine``, and numpy's."""
 
 
@@ -38,7 +38,7 @@ def text(module: str) -> str:
 
 
 @cache
-def tree(module: str) -> ast.Module:
+def module_tree(module: str) -> ast.Module:
     """The parsed source of a module of the project."""
     return ast.parse(text(module))
 
@@ -47,7 +47,9 @@ def function_of(parsed: ast.AST, name: str) -> Function:
     """The definition with this qualified name; raises NoSuchFunction."""
     place: ast.AST = parsed
     for part in name.replace(".<locals>", "").split("."):
-        inner = [each for each in _inside(place) if isinstance(each, Function | ast.ClassDef) and each.name == part]
+        inner = [
+            each for each in _nodes_of_block(place) if isinstance(each, Function | ast.ClassDef) and each.name == part
+        ]
         if not inner:
             raise NoSuchFunction(name)
         place = inner[-1]
@@ -56,12 +58,12 @@ def function_of(parsed: ast.AST, name: str) -> Function:
     return place
 
 
-def _inside(node: ast.AST) -> Iterator[ast.AST]:
+def _nodes_of_block(node: ast.AST) -> Iterator[ast.AST]:
     """Nodes of a function's block, except those inside nested functions and classes."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, Function | ast.ClassDef | ast.Lambda):
-            yield from _inside(child)
+            yield from _nodes_of_block(child)
 
 
 def parameters(function: Function) -> list[str]:
@@ -70,19 +72,19 @@ def parameters(function: Function) -> list[str]:
     return [name for name in given if name not in ("self", "cls")]
 
 
-def roots(function: Function) -> dict[str, str]:
+def roots_of_names(function: Function) -> dict[str, str]:
     """Names that refer to an argument of the function or to a view of it, each with the argument's name."""
     known = {name: name for name in parameters(function)}
-    for node in _inside(function):
+    for node in _nodes_of_block(function):
         if isinstance(node, ast.Assign):
-            for target, value in _pairs(node):
+            for target, value in _assigned_pairs(node):
                 root = root_of(value, known)
                 if isinstance(target, ast.Name) and root and not isinstance(value, ast.BinOp):
                     known.setdefault(target.id, root)
     return known
 
 
-def _pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
+def _assigned_pairs(node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
     for target in node.targets:
         if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
             yield from zip(target.elts, node.value.elts, strict=False)
@@ -95,7 +97,7 @@ def root_of(node: ast.expr, known: dict[str, str]) -> str:
     while isinstance(node, ast.Subscript | ast.Attribute | ast.Call):
         if isinstance(node, ast.Call):
             inner = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            if inner not in VIEWS:
+            if inner not in VIEW_FUNCTIONS:
                 return ""
             node = node.args[0] if isinstance(node.func, ast.Name) and node.args else node.func
         else:
@@ -103,16 +105,16 @@ def root_of(node: ast.expr, known: dict[str, str]) -> str:
     return known.get(node.id, "") if isinstance(node, ast.Name) else ""
 
 
-def _stores(node: ast.AST, known: dict[str, str]) -> set[str]:
+def _written_arguments(node: ast.AST, known: dict[str, str]) -> set[str]:
     """Names of the arguments that an assignment writes into."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AugAssign) else []
     parts = [part for target in targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
     return {root_of(part, known) for part in parts if isinstance(part, ast.Subscript | ast.Attribute)} - {""}
 
 
-def _imported(module: str, name: str) -> tuple[str, str] | None:
+def _defining_module(module: str, name: str) -> tuple[str, str] | None:
     """Module and name where a name used in a module is defined; None for names from outside the project."""
-    for node in ast.walk(tree(module)):
+    for node in ast.walk(module_tree(module)):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("models"):
             for each in node.names:
                 if (each.asname or each.name) == name:
@@ -121,44 +123,46 @@ def _imported(module: str, name: str) -> tuple[str, str] | None:
 
 
 @cache
-def original(module: str, name: str) -> Function | None:
+def original_definition(module: str, name: str) -> Function | None:
     """Definition of a function in the unchanged sources; None if there is none."""
     try:
-        return function_of(tree(module), name)
+        return function_of(module_tree(module), name)
     except (NoSuchFunction, OSError):
         return None
 
 
 @cache
-def written(module: str, name: str) -> frozenset[str]:
+def written_arguments(module: str, name: str) -> frozenset[str]:
     """Arguments of a function that it passes to other functions which write into them. A function that is being
     examined already, in a recursion, counts as writing nothing."""
-    function = original(module, name)
-    if function is None or (module, name) in _asked:
+    function = original_definition(module, name)
+    if function is None or (module, name) in _functions_asked:
         return frozenset()
-    _asked.add((module, name))
-    known, touched = roots(function), set[str]()
-    for node in _inside(function):
+    _functions_asked.add((module, name))
+    known, touched = roots_of_names(function), set[str]()
+    for node in _nodes_of_block(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            touched |= handed((module, name), node, known)
-    _asked.remove((module, name))
+            touched |= arguments_handed_on((module, name), node, known)
+    _functions_asked.remove((module, name))
     return frozenset(touched)
 
 
-_asked: set[tuple[str, str]] = set()
+_functions_asked: set[tuple[str, str]] = set()
 
 
-def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
+def arguments_handed_on(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
     """Names of the caller's arguments that a call passes to a function which writes into them; caller: module and
     name."""
-    place = _imported(caller[0], getattr(call.func, "id", ""))
+    place = _defining_module(caller[0], getattr(call.func, "id", ""))
     if place is None or place == caller:
         return set()
-    callee = original(*place)
+    callee = original_definition(*place)
     if callee is None:
         return set()
-    inner = roots(callee)
-    touched = set().union(*(_stores(node, inner) for node in _inside(callee))) | written(*place)
+    inner = roots_of_names(callee)
+    touched = set().union(*(_written_arguments(node, inner) for node in _nodes_of_block(callee))) | written_arguments(
+        *place
+    )
     pairs = zip(call.args, parameters(callee), strict=False)
     return {root_of(given, known) for given, parameter in pairs if parameter in touched} - {""}
 
@@ -171,7 +175,7 @@ def arrays_behind(function: Function, known: dict[str, str], roots: set[str]) ->
         if isinstance(statement, ast.Assign):
             outermost |= {each.id for each in ast.walk(statement) if isinstance(each, ast.Name)}
     behind = dict[str, list[ast.Call]]()
-    for node in _inside(function):
+    for node in _nodes_of_block(function):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "array":
             pointer, names = node.args[0], {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
             root = known.get(pointer.id, "") if isinstance(pointer, ast.Name) else ""
@@ -185,7 +189,7 @@ class _Spoil(ast.NodeTransformer):
     scaled when the function ends; behind: arrays over those of them that are pointers, see ``arrays_behind``."""
 
     def __init__(self, caller: tuple[str, str], function: Function, last: list[str], place: int) -> None:
-        self.caller, self.known, self.last, self.place = caller, roots(function), last, place
+        self.caller, self.known, self.last, self.place = caller, roots_of_names(function), last, place
         self.behind = {
             root: [copy.deepcopy(each) for each in calls]
             for root, calls in arrays_behind(function, self.known, {*last}).items()
@@ -218,7 +222,7 @@ class _Spoil(ast.NodeTransformer):
     def visit_Expr(self, node: ast.Expr) -> ast.Expr:
         """Spoil the value that a call writes behind a pointer before the call; an array is spoiled at the end."""
         if isinstance(node.value, ast.Call):
-            for root in sorted(handed(self.caller, node.value, self.known) - {*self.behind})[:1]:
+            for root in sorted(arguments_handed_on(self.caller, node.value, self.known) - {*self.behind})[:1]:
                 given = [each if root_of(each, self.known) else self._into(each, root) for each in node.value.args]
                 node.value.args = given
         return node
@@ -232,7 +236,7 @@ class _Spoil(ast.NodeTransformer):
     def _put(self, node: Any) -> Any:
         """Rewrite an assignment into an argument so that the assigned value carries the fault. If the whole argument is
         scaled at the end, the value is only changed where the argument is no array."""
-        into = sorted(_stores(node, self.known))
+        into = sorted(_written_arguments(node, self.known))
         if into and not set(into) & set(self.last):
             node.value = self._spoiled(node.value)
         elif into:
@@ -261,10 +265,10 @@ def rewritten(source: str, module: str, names: dict[str, int]) -> ast.Module:
     parsed = ast.parse(source)
     for name, place in names.items():
         function = function_of(parsed, name)
-        last = sorted(written(module, name))
+        last = sorted(written_arguments(module, name))
         function.body = _Spoil((module, name), function, last, place).body(function.body)
     helpers: list[ast.stmt] = [ast.ImportFrom("validation.blind_spots.spoiling", [*map(_as_helper, HELPERS)], 0)]
-    if COMPILES.search(source):
+    if COMPILER_PATTERN.search(source):
         helpers += [ast.Import([ast.alias("validation.blind_spots.compiled_spoiling", "_compiled_by_audit")])]
     first = sum(1 for _ in takewhile(_stands_first, parsed.body))
     parsed.body[first:first] = helpers

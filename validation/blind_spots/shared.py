@@ -6,7 +6,7 @@ where only that engine's side imports it. Every other module is shared: both eng
 both, or it is found by listing a folder, where no import names it.
 
 Of a shared module every compiled function counts, by its decorator. A function of Python counts where ``sides`` has
-seen at least two engines call it for numbers, unless it is in a folder of ``MACHINERY``; all other folders of
+seen at least two engines call it for numbers, unless it is in a folder of ``MACHINERY_FOLDERS``; all other folders of
 ``models`` count, new ones too.
 """
 
@@ -15,37 +15,37 @@ import re
 from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 
-from validation.blind_spots.rewriting import COMPILES, ROOT, Function, text, tree
+from validation.blind_spots.rewriting import COMPILER_PATTERN, ROOT, Function, module_tree, text
 
 ENGINES = ("exudyn", "mujoco")
-SYSTEMS = "models.systems."
-MACHINERY = ("advice", "core", "drawing", "ensemble", "machine")
+SYSTEMS_PREFIX = "models.systems."
+MACHINERY_FOLDERS = ("advice", "core", "drawing", "ensemble", "machine")
 """Folders that hold no law of a vehicle: scene files, results, prices, workers, pictures."""
-IMPORT = re.compile(
+IMPORT_PATTERN = re.compile(
     r"^ *(?:import (\S.*)|from ((?:models|exudyn|mujoco)[.\w]*) import (?:\(([^)]*)\)|(.*)))", re.MULTILINE
 )
-COMPILING = ("njit", "compiled", "lean", "inlined", "register_jitable", "cfunc")
+COMPILING_DECORATORS = ("njit", "compiled", "lean", "inlined", "register_jitable", "cfunc")
 """Decorators of functions that numba compiles."""
 
 
 @cache
-def modules() -> frozenset[str]:
+def all_modules() -> frozenset[str]:
     """All modules of ``models``, by name."""
     paths = (path.relative_to(ROOT).with_suffix("") for path in sorted((ROOT / "models").rglob("*.py")))
     return frozenset(".".join(path.parts).removesuffix(".__init__") for path in paths)
 
 
 @cache
-def imports(module: str) -> frozenset[str]:
+def imported_modules(module: str) -> frozenset[str]:
     """Modules of ``models`` and engines that a module imports, anywhere in its source."""
     names = set[str]()
-    for whole, package, inside, line in IMPORT.findall(text(module)):
+    for whole, package, inside, line in IMPORT_PATTERN.findall(text(module)):
         parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
         names |= {whole.split()[0]} if whole else {package, *(f"{package}.{part}" for part in parts)}
-    return frozenset((names & modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
+    return frozenset((names & all_modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
 
 
-def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
+def modules_of_side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
     """The modules in ``begin`` and all modules that they import, directly or not, without passing through those in
     ``without``."""
     reached, left = set[str](), [name for name in begin if name not in without]
@@ -53,19 +53,19 @@ def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str
         name = left.pop()
         if name not in reached:
             reached.add(name)
-            left += [each for each in imports(name) if each not in ENGINES and each not in without]
+            left += [each for each in imported_modules(name) if each not in ENGINES and each not in without]
     return reached
 
 
 @cache
 def shared_modules() -> tuple[str, ...]:
     """Sorted names of the modules that more than one implementation (Exudyn, MuJoCo or the reference) uses."""
-    of = [{name for name in modules() if engine in imports(name)} for engine in ENGINES]
+    of = [{name for name in all_modules() if engine in imported_modules(name)} for engine in ENGINES]
     engines = frozenset[str]().union(*of)
-    first, second = (side(names) for names in of)
-    systems = side((name for name in modules() if name.startswith(SYSTEMS)), engines)
+    first, second = (modules_of_side(names) for names in of)
+    systems = modules_of_side((name for name in all_modules() if name.startswith(SYSTEMS_PREFIX)), engines)
     alone = (first ^ second) - systems
-    return tuple(sorted(modules() - engines - alone - {"models"}))
+    return tuple(sorted(all_modules() - engines - alone - {"models"}))
 
 
 def definitions(module: str) -> Iterator[tuple[str, Function]]:
@@ -79,30 +79,30 @@ def definitions(module: str) -> Iterator[tuple[str, Function]]:
             elif isinstance(child, ast.stmt):
                 yield from inside(child, f"{prefix}{child.name}." if isinstance(child, ast.ClassDef) else prefix)
 
-    return inside(tree(module), "")
+    return inside(module_tree(module), "")
 
 
 def is_compiled(function: Function) -> bool:
     """Whether a decorator says that numba compiles it."""
     names = (ast.unparse(each).partition("(")[0].rpartition(".")[2] for each in function.decorator_list)
-    return any(name in COMPILING for name in names)
+    return any(name in COMPILING_DECORATORS for name in names)
 
 
 @cache
 def compiled_functions() -> list[str]:
     """``module:name`` of every compiled function of the shared modules."""
-    compiling = [module for module in shared_modules() if COMPILES.search(text(module))]
+    compiling = [module for module in shared_modules() if COMPILER_PATTERN.search(text(module))]
     return [f"{module}:{name}" for module in compiling for name, each in definitions(module) if is_compiled(each)]
 
 
 @cache
 def law_functions() -> list[str]:
     """``module:name`` of every function, compiled or not, of the shared modules that hold laws."""
-    laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY]
+    laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY_FOLDERS]
     return [f"{module}:{name}" for module in laws for name, _ in definitions(module)]
 
 
-def candidates() -> list[str]:
+def candidate_functions() -> list[str]:
     """``module:name`` of all functions that are shared if they give numbers, compiled ones first."""
     return list(dict.fromkeys((*compiled_functions(), *law_functions())))
 
@@ -111,4 +111,4 @@ def shared_functions(several: Collection[str]) -> list[str]:
     """``module:name`` of all shared functions, compiled ones first; several : Python functions that several engines
     call."""
     compiled = set(compiled_functions())
-    return [name for name in candidates() if name in compiled or name in several]
+    return [name for name in candidate_functions() if name in compiled or name in several]

@@ -16,9 +16,9 @@ from typing import Any
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from validation.blind_spots.rewriting import ROOT
 
-FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
+SCENE_FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
 """Scenes that are short to run, which name as many tables as go together; no two of one name."""
-JUDGE = ".assumptions"
+JUDGE_SUFFIX = ".assumptions"
 """End of the names of modules that judge the answer of a run, and give no number of it."""
 Run = tuple[str, str]
 """File of a scene, and an engine."""
@@ -26,10 +26,10 @@ Run = tuple[str, str]
 
 def scenes() -> dict[str, Path]:
     """All scenes, by the names of their files."""
-    return {path.name: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
+    return {path.name: path for folder in SCENE_FOLDERS for path in sorted(folder.glob("*.toml"))}
 
 
-def runs() -> list[Run]:
+def runs_to_trace() -> list[Run]:
     """The runs to trace: each scene in all engines of its system, if it has at least two."""
     engines = {name: engines_of(path) for name, path in scenes().items()}
     return [(name, engine) for name, several in engines.items() if len(several) > 1 for engine in several]
@@ -41,7 +41,7 @@ def engines_of(scene: Path) -> tuple[str, ...]:
     return (*system.engines, *system.on_request)
 
 
-def prepared(scene: str) -> Any:
+def prepared_scene(scene: str) -> Any:
     """One of the ``scenes``, read and checked."""
     path = scenes()[scene]
     table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -49,7 +49,7 @@ def prepared(scene: str) -> Any:
     return of_table(table, scene, path.parent)
 
 
-def sides(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
+def engines_of_functions(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
     """Engines that share each function, sorted, by its name. Functions that no scene runs in two engines are left out.
 
     traced : of each run its "run", a ``Run``, and "numbers", the names of functions that gave numbers in it.
@@ -65,5 +65,5 @@ def sides(traced: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:
     return {
         function: tuple(sorted(several))
         for function, several in shared.items()
-        if several and not function.partition(":")[0].endswith(JUDGE)
+        if several and not function.partition(":")[0].endswith(JUDGE_SUFFIX)
     }

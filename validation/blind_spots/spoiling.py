@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.blind_spots.memory import FAULTS, NUMBERS, RAN
+from validation.blind_spots.memory import FAULTS, FUNCTIONS_THAT_RAN, FUNCTIONS_WITH_NUMBERS
 
 
 def numeric(value: Any) -> bool:
@@ -37,9 +37,9 @@ def _is_labelled(value: Any) -> bool:
 
 def _ran(value: Any, place: int) -> float:
     """Record that a function gave a value; returns the factor of its planted fault, 1 without a fault."""
-    RAN[place] = 1.0
-    if not NUMBERS[place] and numeric(value):
-        NUMBERS[place] = 1.0
+    FUNCTIONS_THAT_RAN[place] = 1.0
+    if not FUNCTIONS_WITH_NUMBERS[place] and numeric(value):
+        FUNCTIONS_WITH_NUMBERS[place] = 1.0
     return 1.0 + FAULTS[place]
 
 

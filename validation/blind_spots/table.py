@@ -20,14 +20,14 @@ from pathlib import Path
 from models.core.whole_files import whole_file
 from validation.blind_spots.shared import compiled_functions
 
-KEPT = Path(__file__).with_name("blind_spots.csv")
-HARMLESS = Path(__file__).with_name("harmless.csv")
+TABLE_FILE = Path(__file__).with_name("blind_spots.csv")
+HARMLESS_FILE = Path(__file__).with_name("harmless.csv")
 WHY_HARMLESS = ("harmless, as they change cost alone", "harmless, without a number of their own")
 """Why a fault changes no value: it moves a starting point or a step of a search, whose end stays within the stated
 error; or the function gives views of its arguments, new arrays that are written over, zeros, or nothing."""
-INDEPENDENT = ("closed form", "published", "native", "written equations", "plain counterpart")
+INDEPENDENT_GROUNDS = ("closed form", "published", "native", "written equations", "plain counterpart")
 CHECKS_OF_CHECKS = "planted."
-JOINED = "; "
+LIST_SEPARATOR = "; "
 NOT_AUDITED = "not audited"
 
 
@@ -62,12 +62,12 @@ class Line:
     @property
     def noticed(self) -> int:
         """Number of rows and tests that notice the fault."""
-        return sum(len(text.split(JOINED)) for text in (self.rows, self.tests) if text)
+        return sum(len(text.split(LIST_SEPARATOR)) for text in (self.rows, self.tests) if text)
 
     def with_others(self, line: "Line") -> "Line":
         """This line joined with a line of other checks on the same function."""
         texts = {
-            name: JOINED.join(filter(None, (getattr(self, name), getattr(line, name))))
+            name: LIST_SEPARATOR.join(filter(None, (getattr(self, name), getattr(line, name))))
             for name in ("rows", "tests", "independent")
         }
         made = replace(self, calling=self.calling + line.calling, left=self.left + line.left)
@@ -75,7 +75,7 @@ class Line:
         return Line(**{**asdict(made), **texts})
 
 
-def read(path: Path = KEPT) -> list[Line]:
+def read(path: Path = TABLE_FILE) -> list[Line]:
     """The lines of a table; none where there is no file."""
     if not path.is_file():
         return []
@@ -96,13 +96,13 @@ def write(lines: Iterable[Line], path: Path) -> None:
 
 def is_independent(id: str, grounds: str) -> bool:
     """Whether a row or test with this id on these grounds counts as independent."""
-    return grounds in INDEPENDENT and not id.startswith(CHECKS_OF_CHECKS)
+    return grounds in INDEPENDENT_GROUNDS and not id.startswith(CHECKS_OF_CHECKS)
 
 
 @cache
-def harmless() -> dict[str, tuple[str, str]]:
+def harmless_functions() -> dict[str, tuple[str, str]]:
     """Functions whose faults change no value: why, one of ``WHY_HARMLESS``, and the id of the test that proves it."""
-    with HARMLESS.open(newline="", encoding="utf-8") as file:
+    with HARMLESS_FILE.open(newline="", encoding="utf-8") as file:
         return {each["function"]: (each["why"], each["proof"]) for each in csv.DictReader(file)}
 
 
@@ -111,7 +111,7 @@ def kind_of(function: str, engines: Mapping[str, tuple[str, ...]]) -> str:
     return "compiled" if function in compiled_functions() else " ".join(["Python", *engines.get(function, ())])
 
 
-def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
+def merged_lines(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[str]) -> list[Line]:
     """The newly measured lines, and the kept lines of all other functions that still exist.
 
     A function that was not audited now keeps its line.
@@ -122,7 +122,7 @@ def merged(kept: Iterable[Line], measured: Iterable[Line], functions: Iterable[s
     return [lines[name] for name in functions if name in lines]
 
 
-def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
+def uncovered_functions(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
     """Functions whose fault no independent check notices, grouped by the reason.
 
     functions : all that are shared now; those that have no line are "not audited" as well.
@@ -132,8 +132,8 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
     gaps |= {"run by nothing": [], "not spoiled": [], NOT_AUDITED: [], **{why: [] for why in WHY_HARMLESS}}
     for name in functions:
         line = known.get(name)
-        if name in harmless():
-            gaps[harmless()[name][0]].append(name)
+        if name in harmless_functions():
+            gaps[harmless_functions()[name][0]].append(name)
         elif line is None or line.ended in (NOT_AUDITED, "not spoiled"):
             gaps[NOT_AUDITED if line is None else line.ended].append(name)
         elif line.ended == "not run":
@@ -145,6 +145,6 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
 
 
 if __name__ == "__main__":
-    from validation.blind_spots.shared import candidates
+    from validation.blind_spots.shared import candidate_functions
 
-    write(merged(read(), read(Path(sys.argv[1]) / KEPT.name), candidates()), KEPT)
+    write(merged_lines(read(), read(Path(sys.argv[1]) / TABLE_FILE.name), candidate_functions()), TABLE_FILE)

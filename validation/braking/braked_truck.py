@@ -6,11 +6,11 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.plane_records import Report, motion_of
-from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane, plane_of_truck
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road
 from models.core.errors import RunFailed
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
 
 def on_road(plane: Plane, tables: Tables, road: Road = UNIFORM_ROAD, slope: float = 10.0) -> OnRoad:
@@ -83,23 +83,23 @@ class RollingTruck:
         return self
 
 
-PLANE = truck(PAPER)
-ICE = surface("ice")
-LOCKS = 1e9
+PAPER_PLANE = plane_of_truck(PAPER_TRUCK)
+ICE_TABLE = table_of_surface("ice")
+LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on(tables: Tables | None = None, plane: Plane = PLANE) -> OnRoad:
+def truck_on(tables: Tables | None = None, plane: Plane = PAPER_PLANE) -> OnRoad:
     """The truck on ice, or on other tyre tables with the slip-angle slope of those of ice."""
-    return on_road(plane, tables or stacked([ICE]), slope=ICE.cornering)
+    return on_road(plane, tables or stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering)
 
 
-def constant(mu: float) -> Tables:
+def constant_friction(mu: float) -> Tables:
     """Tyre table whose friction has the same value at every slip from 0.1 on."""
     flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
     g, h = np.ones((3, 3)) * np.array([1.0, 0.0, 0.0]), np.array([[0.0], [mu], [mu]])
-    return stacked([TyreTable(*nodes, flat, g, h)])
+    return stacked_tables([TyreTable(*nodes, flat, g, h)])
 
 
 def transfer_errors(mu: float = 0.4) -> dict[str, float]:
@@ -108,17 +108,17 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
     axles' loads change by m z g h / E.
     """
-    lift = PAPER.height / PAPER.wheelbase
-    light, static = PLANE._replace(spin=np.full(4, 1e-9)), PLANE.static.reshape(2, 2).sum(1)
+    lift = PAPER_TRUCK.height / PAPER_TRUCK.wheelbase
+    light, static = PAPER_PLANE._replace(spin=np.full(4, 1e-9)), PAPER_PLANE.static.reshape(2, 2).sum(1)
     slowing = {
         "all wheels": mu * GRAVITY,
-        "front wheels": mu * static[0] / (PAPER.mass * (1.0 - mu * lift)),
-        "rear wheels": mu * static[1] / (PAPER.mass * (1.0 + mu * lift)),
+        "front wheels": mu * static[0] / (PAPER_TRUCK.mass * (1.0 - mu * lift)),
+        "rear wheels": mu * static[1] / (PAPER_TRUCK.mass * (1.0 + mu * lift)),
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        slid = RollingTruck(truck_on(constant(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
-        wanted = static + PAPER.mass * slowing[name] * lift * np.array([1.0, -1.0])
+        slid = RollingTruck(truck_on(constant_friction(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
+        wanted = static + PAPER_TRUCK.mass * slowing[name] * lift * np.array([1.0, -1.0])
         errors[name] = float(np.abs(slid.report.load.reshape(2, 2).sum(1) / wanted - 1.0).max())
     return errors
 
@@ -126,5 +126,5 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
 def sideways_with_locked_front_wheels() -> float:
     """Lateral displacement (m) of a truck that slows from 10 to 1 m/s on ice with its front wheels steered by 0.05 rad
     and locked."""
-    locked = np.array([LOCKS, LOCKS, 0.0, 0.0])
+    locked = np.array([LOCKING_TORQUE, LOCKING_TORQUE, 0.0, 0.0])
     return float(RollingTruck(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])

@@ -9,17 +9,17 @@ from models.brake.brake import PAPER_FRONT, of_wheels, torque
 from models.brake.controller import AllApplied, Command, Sample
 from models.brake.plane_chain import inertia
 from models.brake.plane_step import share_out
-from models.brake.plane_vehicle import GRAVITY, PAPER, truck
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.port.ask import checked_answer
 from models.brake.surfaces import Stretch, road
-from models.brake.trailer import CHOSEN, train
-from models.systems.braking.march import Start
-from models.systems.braking.procedures import ready
+from models.brake.trailer import CHOSEN_TRAILER, plane_of_train
+from models.systems.braking.march import StartState
+from models.systems.braking.procedures import vehicle_and_start
 from models.systems.braking.run import marched_by, run
 from models.systems.braking.scene import BrakingScene, build
 from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, MovedVehicle, bent_friction
 
-TRUCK, HIGH_TRUCKS = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}))
+TRUCK, HIGH_TRUCKS = plane_of_truck(PAPER_TRUCK), plane_of_truck(PAPER_TRUCK.model_copy(update={"height": 4.0}))
 """The paper's truck, and one as high as it is long and twice as high as it is wide."""
 
 
@@ -51,7 +51,7 @@ def on_even_friction(implementation: str, folder: Path) -> float:
     return float(np.abs(moved.state[:, 1:]).max())
 
 
-def mirrored(implementation: str, folder: Path) -> float:
+def mirrored_truck_error(implementation: str, folder: Path) -> float:
     """Case: the truck brakes and steers left, with less friction on the left. Error: difference (m, rad) from the
     mirror image of the mirrored stop."""
     ends = []
@@ -62,7 +62,7 @@ def mirrored(implementation: str, folder: Path) -> float:
     return float(np.abs(ends[0] - ends[1]).max())
 
 
-def lifting(implementation: str, folder: Path) -> float:
+def lifting_truck_error(implementation: str, folder: Path) -> float:
     """A truck as high as it is long, braked on dry road."""
     MovedVehicle(implementation, HIGH_TRUCKS, DRY, speed=20.0).under(np.full((101, 4), 2e4))
     return np.inf
@@ -74,10 +74,10 @@ def turned_over(implementation: str, folder: Path) -> float:
     return np.inf
 
 
-def jackknifed(implementation: str, folder: Path) -> float:
+def jackknifed_train_error(implementation: str, folder: Path) -> float:
     """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: ratio of the largest gain
     of energy over 0.4 s to the initial energy."""
-    plane = train(PAPER, CHOSEN.model_copy(update={"fold": np.pi}), transfer=False)
+    plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), transfer=False)
     moved = MovedVehicle(implementation, plane, DRY, turning=0.0)
     state = moved.state
     state[0, 3:] = np.radians(-100.0)
@@ -98,7 +98,10 @@ def jackknifed(implementation: str, folder: Path) -> float:
 def no_friction_on_one_side(implementation: str, folder: Path) -> float:
     """Case: all wheels of the truck are locked for 5 ms, with friction 0 on the left and 0.8 on the right. Error:
     relative difference of the lost speed from mu g t / 2."""
-    tyres, plane = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
+    tyres, plane = (
+        (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
+        plane_of_truck(PAPER_TRUCK, transfer=False),
+    )
     moved = MovedVehicle(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
     moved.under(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
@@ -115,23 +118,25 @@ def lagging_at_rest(implementation: str, folder: Path) -> float:
     """Case: the truck stops from a slide on tyres with relaxation, then brakes on for 1 s. Error: distance and speed
     (m, m/s) after the stop."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
-    vehicle, begun = ready(scene, "stop")
+    vehicle, begun = vehicle_and_start(scene, "stop")
     vehicle = marched_by(vehicle, implementation)
     begun.state[1, 1] = 0.2
     path = vehicle.run(AllApplied(4), begun, 10.0)
-    rest = Start(path.states[-1].copy(), path.turning[-1].copy())
+    rest = StartState(path.states[-1].copy(), path.turning[-1].copy())
     after = vehicle.run(AllApplied(4), rest, 1.0)
     moved = np.abs(after.states[:, 0] - rest.state[0]).max() + np.abs(after.states[:, 1]).max()
-    return float(moved) if path.stands else np.inf
+    return float(moved) if path.ended_at_rest else np.inf
 
 
-def rests(**tables: Any) -> Error:
+def rest_error_of_scene(**tables: Any) -> Error:
     """Case from a scene in which the vehicle must come to rest. Error: remaining speeds of vehicle and wheels (m/s,
     rad/s)."""
 
     def error(implementation: str, folder: Path) -> float:
         path = run(braking_scene(**tables), implementation).detail
-        return float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.stands else np.inf
+        return (
+            float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.ended_at_rest else np.inf
+        )
 
     return error
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.advance import AT_REST, ENDS, advance, ending
+from models.brake.advance import AT_REST, FATAL_ENDS, advance, ending_sentence
 from models.brake.plane_vehicle import GRAVITY, Plane
 from models.brake.quarter import Quarter
 from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
 from models.core.errors import RunFailed
 from models.engines.braking import CarriedChassis
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import TyreTable, stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import TyreTable, stacked_tables
 from validation.braking.braked_truck import RollingTruck, on_road
 from validation.braking.quarter_stops import exact_distance
 
@@ -20,7 +20,7 @@ Error = Callable[[str, Path], float]
 STEP, SPEED = 5.5e-3, 10.0
 QUARTER = Quarter(mass=1700.0, radius=0.5, spin_inertia=13.35)
 LOAD = QUARTER.mass * GRAVITY
-DRY, ICE = surface("dry"), surface("ice")
+DRY, ICE = table_of_surface("dry"), table_of_surface("ice")
 
 
 def bent_friction(*points: tuple[float, float]) -> TyreTable:
@@ -45,7 +45,7 @@ class MovedVehicle(RollingTruck):
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else CarriedChassis(implementation, plane).advance
-        super().__init__(on_road(plane, stacked(tyres), road), speed, steer=steer, step_function=go)
+        super().__init__(on_road(plane, stacked_tables(tyres), road), speed, steer=steer, step_function=go)
         self.implementation = implementation
         if turning is not None:
             self.turning[:] = turning
@@ -55,8 +55,8 @@ class MovedVehicle(RollingTruck):
         RunFailed."""
         self.motion.accelerations[:] = 0.0
         status, used = self.on(torques, step)
-        if status in ENDS:
-            raise RunFailed(self.implementation, ending(status, self.plane, self.motion), used)
+        if status in FATAL_ENDS:
+            raise RunFailed(self.implementation, ending_sentence(status, self.plane, self.motion), used)
         return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
 
     @property
@@ -65,7 +65,7 @@ class MovedVehicle(RollingTruck):
         return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
 
 
-def stopping(
+def stopping_distance(
     implementation: str,
     level: float,
     *tyres: TyreTable,
@@ -94,51 +94,58 @@ def settled_stop(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
 def steady_slip_case(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
     """Case: a stop at constant slip. Error: relative difference of the distance from m v^2 / (2 F)."""
     level, way, turning = settled_stop(tyre, slip)
-    return lambda name, folder: abs(stopping(name, level, tyre, step=step, turning=turning) / way - 1.0)
+    return lambda name, folder: abs(stopping_distance(name, level, tyre, step=step, turning=turning) / way - 1.0)
 
 
 def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
     """Case: a stop that starts with a rolling wheel. Error: relative difference of the distance from the exact one."""
     level, _, _ = settled_stop(tyre, slip)
     return lambda name, folder: abs(
-        stopping(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
+        stopping_distance(name, level, tyre, step=step) / exact_distance(QUARTER, tyre, level, SPEED) - 1.0
     )
 
 
-PEAKED = bent_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
+PEAKED_FRICTION = bent_friction((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
 
 
 def beyond_the_peak(implementation: str, folder: Path) -> float:
     """Case: a torque 0.1 % above that of the friction peak, so that the wheel locks. Error: relative difference of the
     distance from the exact one."""
     peak = 1.001 * LOAD * 0.8 * (QUARTER.radius + QUARTER.spin_inertia / (QUARTER.mass * QUARTER.radius))
-    return abs(stopping(implementation, peak, PEAKED) / exact_distance(QUARTER, PEAKED, peak, SPEED) - 1.0)
+    return abs(
+        stopping_distance(implementation, peak, PEAKED_FRICTION) / exact_distance(QUARTER, PEAKED_FRICTION, peak, SPEED)
+        - 1.0
+    )
 
 
 def at_the_peak(implementation: str, folder: Path) -> float:
     """Case: exactly the torque of the friction peak. Error: relative amount by which the distance lies outside the
     range from constant peak friction to constant sliding friction."""
     force = LOAD * 0.8
-    way = stopping(implementation, QUARTER.steady_torque(0.1, force), PEAKED, turning=0.9 * SPEED / QUARTER.radius)
+    way = stopping_distance(
+        implementation, QUARTER.steady_torque(0.1, force), PEAKED_FRICTION, turning=0.9 * SPEED / QUARTER.radius
+    )
     least = QUARTER.mass * SPEED**2 / (2.0 * force)
     return max(1.0 - way / least, way / (least * 0.8 / 0.6) - 1.0, 0.0)
 
 
-def locked(implementation: str, folder: Path) -> float:
+def locked_wheel_error(implementation: str, folder: Path) -> float:
     """Case: the wheel is locked from the start. Error: relative difference of the distance from v^2 / (2 mu g)."""
-    way = stopping(implementation, 2e4, DRY, turning=0.0)
+    way = stopping_distance(implementation, 2e4, DRY, turning=0.0)
     return abs(way * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
 
 
-def changing(implementation: str, folder: Path) -> float:
+def changing_friction_error(implementation: str, folder: Path) -> float:
     """Case: a locked wheel whose friction changes from 0.2 to 0.8 after 10 m. Error: relative difference of the
     distance from its closed form."""
     slick, rough = (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
-    way = stopping(implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)]))
+    way = stopping_distance(
+        implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)])
+    )
     return abs(way / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
 
 
-def frictions(implementation: str, folder: Path) -> float:
+def friction_range_error(implementation: str, folder: Path) -> float:
     """Case: a locked wheel for 0.2 s, with friction from 1e-6 to 1.5. Error: difference of the lost speed from mu g
     t."""
     errors = []
@@ -156,7 +163,7 @@ def at_rest(implementation: str, folder: Path) -> float:
     return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
 
 
-def backwards(implementation: str, folder: Path) -> float:
+def backwards_spin_error(implementation: str, folder: Path) -> float:
     """Case: an unbraked wheel starts spinning backwards. Error: relative difference of rim speed and vehicle speed
     after 0.5 s."""
     wheel = MovedVehicle(implementation, QUARTER.plane, DRY, turning=-10.0)
@@ -164,7 +171,7 @@ def backwards(implementation: str, folder: Path) -> float:
     return wheel.rims
 
 
-def released(implementation: str, folder: Path) -> float:
+def released_brake_error(implementation: str, folder: Path) -> float:
     """Case: the brake of a locked wheel is released at the end of a step. Error: relative difference of rim speed and
     vehicle speed 0.6 s later."""
     wheel = MovedVehicle(implementation, QUARTER.plane, ICE, turning=0.0)
@@ -175,8 +182,8 @@ def released(implementation: str, folder: Path) -> float:
 def on_the_line(implementation: str, folder: Path) -> float:
     """Case: a wheel exactly on the line between dry surface (left) and ice (right). Error: difference of the distance
     (m) from that on dry surface alone."""
-    both = stopping(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
-    return abs(both - stopping(implementation, 2e3, DRY))
+    both = stopping_distance(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
+    return abs(both - stopping_distance(implementation, 2e3, DRY))
 
 
 def slope_changes(implementation: str, folder: Path) -> float:
@@ -184,5 +191,5 @@ def slope_changes(implementation: str, folder: Path) -> float:
     difference of the distance from that with the unchanged force."""
     level, way, turning = settled_stop(DRY, 0.004)
     both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
-    stop = stopping(implementation, level, DRY, surface("wet"), step=2e-2, turning=turning, road=both)
+    stop = stopping_distance(implementation, level, DRY, table_of_surface("wet"), step=2e-2, turning=turning, road=both)
     return abs(stop / way - 1.0)

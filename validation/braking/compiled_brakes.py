@@ -3,11 +3,11 @@
 import numpy as np
 
 from models.brake.plain.suspension import WheelForces
-from models.brake.plain.tyre import Braked, Surface, WheelMotion
-from models.brake.plane_records import KNOWN, REPORTED, Report, Wheels
+from models.brake.plain.tyre import BrakedStep, Surface, WheelMotion
+from models.brake.plane_records import KNOWN, REPORT_SIZE, Report, Wheels
 from models.brake.plane_step import slide
 from models.brake.plane_step import tyre as compiled_tyre
-from models.brake.plane_vehicle import PAPER, Plane, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, Plane, plane_of_truck
 from models.brake.relaxation import Lag
 from models.brake.relaxation import lag_on as compiled_lag_on
 from models.brake.sprung import Sprung
@@ -17,20 +17,27 @@ from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
 from models.engines.braking_sprung import driven
 from models.engines.free_vehicle import FreeModel, free_model
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Cells, Tables, cell_and_share, lateral_adhesion, longitudinal_adhesion, stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import (
+    TableCell,
+    Tables,
+    cell_and_share,
+    lateral_adhesion,
+    longitudinal_adhesion,
+    stacked_tables,
+)
 
-PLANE: Plane = truck(PAPER)
-DRY = stacked([surface("dry")])
+PAPER_PLANE: Plane = plane_of_truck(PAPER_TRUCK)
+DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 
-def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
+def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
     """Compiled tyre step; its values (7,) are those of ``models.brake.plain.tyre.tyre``."""
-    wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORTED, 1)), surfaces(1)
+    wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORT_SIZE, 1)), surfaces(1)
     below.first[0], below.second[0], below.share[0] = surface.first, surface.second, surface.share
     wheels.start[0], wheels.load[0] = motion.start, load
-    ahead = motion.forwards if motion.start >= 0.0 else -motion.forwards
-    slide(0, ahead, motion.across, motion.regular, below.lag, tables.angles, wheels)
+    ahead = motion.forward_speed if motion.start >= 0.0 else -motion.forward_speed
+    slide(0, ahead, motion.across, motion.least_speed, below.lag, tables.angles, wheels)
     given = StepInput(motion.start, motion.start + braked.step * motion.rate, *braked.torques, braked.step)
     compiled_tyre(
         0, given, Wheel(braked.radius, braked.inertia, braked.turning), tables, wheels, below, Report(*report)
@@ -41,7 +48,7 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
 def friction(tables: Tables, table_index: int, angle: float, load: float, slip: float) -> tuple[float, float]:
     """mu_x and mu_y of one of the tables at a slip angle (rad), a load (N) and a slip."""
     cells, (s, w) = (
-        Cells(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
+        TableCell(*cell_and_share(tables.angles, angle), *cell_and_share(tables.loads, load)),
         cell_and_share(tables.slips, slip),
     )
     below, above = (
@@ -54,7 +61,7 @@ def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) 
     """First table, second table and share of the second (4, 3) under the truck's wheels, for a state (2, 3) and a step
     (s)."""
     below = surfaces(4)
-    compiled_under_wheels(state, step, OnRoad(PLANE, kinds, 0.0, DRY, road), below)
+    compiled_under_wheels(state, step, OnRoad(PAPER_PLANE, kinds, 0.0, DRY_TABLES, road), below)
     return np.column_stack((below.first, below.second, below.share))
 
 
@@ -64,7 +71,7 @@ def lag_on(
     """Compiled counterpart of ``validation.braking.plain_relaxation.lag_on``: lagging slip angles of the truck's tyres
     after a step."""
     after, lagging = lag.copy(), np.zeros(4)
-    truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, UNIFORM_ROAD)
+    truck_on_road = OnRoad(PAPER_PLANE, np.zeros(4, dtype=np.int64), slope, DRY_TABLES, UNIFORM_ROAD)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
     return after, lagging
 

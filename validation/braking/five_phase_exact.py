@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
-from models.brake.controllers.five_phase_cycle import Frozen
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate_of_phase
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed
 
 
 @dataclass(frozen=True)
@@ -81,15 +81,15 @@ class Piece:
                 if end > start and side * (self.slip(end) - node) > 0.0:
                     if side * (self.slip(start) - node) >= 0.0:
                         return start, side
-                    return _root(lambda t, node=node: self.slip(t) - node, start, end), side  # type: ignore[misc]
+                    return _root_in_piece(lambda t, node=node: self.slip(t) - node, start, end), side  # type: ignore[misc]
         return until, 0
 
 
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
+def _root_in_piece(function: Callable[[float], float], low: float, high: float) -> float:
     return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
 
 
-def phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level: float) -> None:
+def advance_phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level: float) -> None:
     """Advance ``state`` (slip, torque, time, impulse) to the end of a phase in which the torque changes at a constant
     rate (N m/s). The phase ends when the rim's acceleration reaches ``level``."""
     i = min(int(np.searchsorted(wheel.slips, state[0], side="right")) - 1, wheel.slips.size - 2)
@@ -108,25 +108,25 @@ def phase(wheel: ExactWheel, state: list[float], rate: float, sign: float, level
     raise ArithmeticError("a phase that does not end")
 
 
-def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
-    """Period and mean force, as ``cycle`` gives them, of a wheel at constant vehicle speed whose brake torque is linear
-    in the pressure. begun: rate of pressure (bar/s) in the first application."""
-    rates = [rate(k, controller) for k in range(6)]
+def exact_cycle(frozen: WheelAtSpeed, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
+    """Period and mean force, as ``last_cycle`` gives them, of a wheel at constant vehicle speed whose brake torque is
+    linear in the pressure. begun: rate of pressure (bar/s) in the first application."""
+    rates = [rate_of_phase(k, controller) for k in range(6)]
     rates[0] = rates[0] if begun is None else begun
     phases = [(frozen.brake.rising * speed, *end_of_phase(k, controller)) for k, speed in enumerate(rates)]
     forces = frozen.load * frozen.tyre.mu_x[0, 0]
-    return cycle(ExactWheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
+    return last_cycle(ExactWheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
 
 
-def cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
+def last_cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:
     """Period (s) of the last of several control cycles, and ratio of its mean force to the largest tyre force.
 
     phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.
     """
     at = [0.0, 0.0, 0.0, 0.0]
-    phase(wheel, at, *phases[0])
+    advance_phase(wheel, at, *phases[0])
     for _ in range(cycles):
         at[2:] = [0.0, 0.0]
         for later in phases[1:]:
-            phase(wheel, at, *later)
+            advance_phase(wheel, at, *later)
     return at[2], at[3] / at[2] / float(wheel.forces.max())

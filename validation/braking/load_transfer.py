@@ -15,17 +15,17 @@ from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
 
 
-def sliding(vehicle: SpatialVehicle, mu: float) -> Handling:
+def sliding_car(vehicle: SpatialVehicle, mu: float) -> Handling:
     """The vehicle with all wheels locked, which slide with constant friction and so brake at mu g."""
     return Handling(vehicle, Tyres(friction=mu, fixed=tuple(tyre.name for tyre in vehicle.tyres)))
 
 
-def turning(vehicle: SpatialVehicle, steer: float) -> Handling:
+def turning_car(vehicle: SpatialVehicle, steer: float) -> Handling:
     """Controls of a turn: the steer angle (rad) is reached at 0.5 s and then stays."""
     return Handling(vehicle, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
 
 
-def transfer(drive: Drive) -> np.ndarray:
+def load_transfer(drive: Drive) -> np.ndarray:
     """Change of the wheel loads from start to end of a drive, as moments (2,) in N m. The lever arms are the wheels'
     design positions: forward, then to the left."""
     design = np.array([tyre.point[:2] for tyre in drive.handling.vehicle.tyres])
@@ -34,8 +34,8 @@ def transfer(drive: Drive) -> np.ndarray:
 
 
 def asked_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
-    """Moments (2,) in N m that ``transfer`` should have by the balance of all bodies at accelerations (2,) in m/s^2:
-    forward, then to the left."""
+    """Moments (2,) in N m that ``load_transfer`` should have by the balance of all bodies at accelerations (2,) in
+    m/s^2: forward, then to the left."""
     handling, free = drive.handling, drive.handling.vehicle
     masses, heights = np.array([(body.mass, body.position[2]) for body in free.bodies]).T
     radii = np.array([tyre.point[2] for tyre in free.tyres])
@@ -51,10 +51,10 @@ def asked_moments(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
 
 def braked_error(drive: Drive, mu: float) -> float:
     """Relative error of the load transfer between front and rear axle while all wheels slide."""
-    return float(transfer(drive)[0] / asked_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
+    return float(load_transfer(drive)[0] / asked_moments(drive, np.array([-mu * GRAVITY, 0.0]))[0] - 1.0)
 
 
 def turning_error(drive: Drive) -> float:
     """Relative error of the load transfer between the left and right wheels in a steady turn."""
     ahead, _, rate = drive.velocity()[-1]
-    return float(transfer(drive)[1] / asked_moments(drive, np.array([0.0, ahead * rate]))[1] - 1.0)
+    return float(load_transfer(drive)[1] / asked_moments(drive, np.array([0.0, ahead * rate]))[1] - 1.0)

@@ -9,12 +9,12 @@ import struct
 import sys
 import time
 
-WELL = 20
+GOOD_SAMPLES = 20
 """Samples that are answered well."""
 NAN = float("nan")
 
 
-def frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
+def answer_frame(number: int, magic: bytes = b"TRA1", mode: bytes = b"V", wheels: int = 4, first: float = 1.0) -> bytes:
     """Bytes of a controller's answer, valid by default; arguments make it invalid."""
     return struct.pack("<4sIBB6x8d", magic, number, mode[0], wheels, first, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -27,17 +27,17 @@ def misbehave(kind: str, number: int, link: socket.socket) -> None:
         time.sleep(0.8)
     link.sendall(
         {
-            "NaN": frame(number, mode=b"P", first=NAN),
-            "infinite": frame(number, mode=b"P", first=float("inf")),
-            "NaN as a valve": frame(number, first=NAN),
-            "negative pressure": frame(number, mode=b"P", first=-1.0),
-            "valve in no state": frame(number, first=0.5),
-            "too few wheels": frame(number, wheels=3),
-            "too many bytes": frame(number) + b"\0",
-            "part of a frame": frame(number)[:33],
+            "NaN": answer_frame(number, mode=b"P", first=NAN),
+            "infinite": answer_frame(number, mode=b"P", first=float("inf")),
+            "NaN as a valve": answer_frame(number, first=NAN),
+            "negative pressure": answer_frame(number, mode=b"P", first=-1.0),
+            "valve in no state": answer_frame(number, first=0.5),
+            "too few wheels": answer_frame(number, wheels=3),
+            "too many bytes": answer_frame(number) + b"\0",
+            "part of a frame": answer_frame(number)[:33],
             "another protocol": b"HTTP/1.1 200 OK\r\n" + 63 * b" ",
-            "answer to another sample": frame(number - 1),
-            "late": frame(number),
+            "answer to another sample": answer_frame(number - 1),
+            "late": answer_frame(number),
             "silence": b"",
         }[kind]
     )
@@ -52,10 +52,10 @@ def main(kind: str, port: str) -> None:
             if len(asked) < 104:
                 return
             number = struct.unpack_from("<I", asked, 4)[0]
-            if number >= WELL:
+            if number >= GOOD_SAMPLES:
                 misbehave(kind, number, link)
                 return
-            link.sendall(frame(number))
+            link.sendall(answer_frame(number))
 
 
 if __name__ == "__main__":

@@ -14,13 +14,13 @@ from models.brake.plain import road as plain_road
 from models.brake.plain import tyre as plain_tyre
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves, resting_chambers
 from models.brake.surfaces import Road, Stretch, road
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking import compiled_brakes as compiled
-from validation.braking.compiled_brakes import PLANE
+from validation.braking.compiled_brakes import PAPER_PLANE
 from validation.braking.plain_relaxation import lag_on as plain_lag_on
 
-STATES = 400
+STATE_COUNT = 400
 SEED = 20_26
 LOADS = np.array([1e3, 4e3, 1e4])
 BY_LOAD = np.array([1.1, 1.0, 0.8])
@@ -29,14 +29,14 @@ BY_LOAD = np.array([1.1, 1.0, 0.8])
 
 def by_load(surface_name: str) -> TyreTable:
     """A surface's tyre whose friction falls with the load."""
-    tables_of = surface(surface_name)
+    tables_of = table_of_surface(surface_name)
     spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
     return replace(spread, mu_x=spread.mu_x * BY_LOAD[None, :, None], h=spread.h * BY_LOAD)
 
 
 def tables() -> Tables:
     """Friction tables of three surfaces, each at several loads."""
-    return stacked([by_load(name) for name in ("dry", "wet", "ice")])
+    return stacked_tables([by_load(name) for name in ("dry", "wet", "ice")])
 
 
 def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
@@ -47,7 +47,7 @@ def largest_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     return apart if np.isfinite(apart) else np.inf
 
 
-def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def tyre_reports(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Tyre reports (count, 7) for random steps, by compiled and by plain code; wheels roll, are locked, are released or
     spin backwards."""
     random, tyre_tables = np.random.default_rng(seed), tables()
@@ -63,13 +63,13 @@ def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.
         under = plain_tyre.Surface(first, other, float(random.choice([0.0, random.uniform()])))
         turning = u * (1.0 - slip) / radius
         motion = plain_tyre.WheelMotion(u, rate, u + 0.5 * step * rate, across, 0.1)
-        braked = plain_tyre.Braked(torques, step, radius, inertia, turning)
+        braked = plain_tyre.BrakedStep(torques, step, radius, inertia, turning)
         plain[i] = plain_tyre.tyre(tyre_tables, under, motion, load, braked)
         reports[i] = compiled.tyre(tyre_tables, under, motion, load, braked)
     return reports, plain
 
 
-def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def random_surfaces(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Surface numbers and shares (4 count, 3) under the wheels of a truck that crosses seams and lines, by compiled and
     by plain code."""
     random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
@@ -79,7 +79,9 @@ def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndar
         state = np.array([random.uniform(-2.0, 4.0, 3), random.uniform(-30.0, 30.0, 3)]) * [1.0, 0.5, 1.0]
         step = random.choice([5.5e-3, 1e-3])
         shares.append(compiled.under_wheels(stretched, state, step, kind))
-        under = plain_road.under_wheels(stretched, plain_road.ways(state[0], state[1], PLANE.place, step), kind)
+        under = plain_road.under_wheels(
+            stretched, plain_road.ground_paths(state[0], state[1], PAPER_PLANE.place, step), kind
+        )
         plain += [[each.first, each.second, each.share] for each in under]
     return np.concatenate(shares), np.array(plain)
 
@@ -120,7 +122,7 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
     return np.concatenate((air.pressure, torques.ravel(), air.supply))
 
 
-def slip_lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def slip_lags(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Lagging slip angles after a step, and those used within the step, (count, 8) for random states, by compiled and
     by plain code."""
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
@@ -132,15 +134,15 @@ def slip_lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.nda
         lag = np.where(random.uniform(size=4) < 0.2, np.nan, random.normal(0.0, 0.1, 4))
         lag = lag if state[1].any() else np.nan_to_num(lag)
         lags[i] = np.concatenate(compiled.lag_on(state, time, steer, slope, length, lag))
-        plain[i] = np.concatenate(plain_lag_on(state, time, steer, PLANE.place, slope, length, lag))
+        plain[i] = np.concatenate(plain_lag_on(state, time, steer, PAPER_PLANE.place, slope, length, lag))
     return lags, plain
 
 
-def frictions(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+def friction_of_random_states(count: int = STATE_COUNT, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """mu_x and mu_y (count, 2) of random states: compiled code on stacked tables, and plain code on each table with its
     own nodes."""
-    random, tyres = np.random.default_rng(seed), [surface("dry"), by_load("wet"), by_load("ice")]
-    all_tables, (coefficients, plain) = stacked(tyres), np.empty((2, count, 2))
+    random, tyres = np.random.default_rng(seed), [table_of_surface("dry"), by_load("wet"), by_load("ice")]
+    all_tables, (coefficients, plain) = stacked_tables(tyres), np.empty((2, count, 2))
     for i in range(count):
         which, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
         slip, chosen = random.uniform(), tyres[which]

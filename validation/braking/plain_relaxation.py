@@ -5,14 +5,14 @@ from scipy.interpolate import CubicHermiteSpline
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.plain import relaxation as plain
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.pressure import Chambers
 from models.systems.braking.march import on_tyres
-from models.tyre.magic_formula import surface
-from validation.braking.sprung_box import GRADIENT, steady_torques
+from models.tyre.magic_formula import table_of_surface
+from validation.braking.sprung_box import TORQUE_PER_BAR, steady_torques
 from validation.braking.truck_equations import braked_turn
 
-FIRST_SPEED, LAST_SPEED, STEER = 11.11, 9.0, 0.03
+FIRST_SPEED, LAST_SPEED, TURN_OF_TRUCK = 11.11, 9.0, 0.03
 """Speeds (m/s) from which and to which the truck turns, and its steer angle (rad)."""
 
 
@@ -46,14 +46,14 @@ def rotation(angle: float) -> np.ndarray:
 def turn_apart(length: float, substeps: int = 4) -> float:
     """Distance (m) between the final positions of a braked turn by the truck model and by its written-out equations.
     The truck's tyres have a relaxation length (m)."""
-    tyre, torques = surface("ice"), (300.0, 200.0)
-    end = braked_turn(PAPER, tyre, STEER, torques, FIRST_SPEED, LAST_SPEED, length)
+    tyre, torques = table_of_surface("ice"), (300.0, 200.0)
+    end = braked_turn(PAPER_TRUCK, tyre, TURN_OF_TRUCK, torques, FIRST_SPEED, LAST_SPEED, length)
     path = on_tyres(
-        truck(PAPER),
+        plane_of_truck(PAPER_TRUCK),
         [tyre],
-        of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=GRADIENT, falling=GRADIENT),)),
+        of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=TORQUE_PER_BAR, falling=TORQUE_PER_BAR),)),
         Chambers(np.zeros(4), np.zeros(4), 6.0),
-        steer=np.array([STEER, STEER, 0.0, 0.0]),
+        steer=np.array([TURN_OF_TRUCK, TURN_OF_TRUCK, 0.0, 0.0]),
         substeps=substeps,
         relaxation=np.full(4, length),
     ).run(steady_torques(*np.repeat(torques, 2)), FIRST_SPEED, end.time)

@@ -10,13 +10,13 @@ from models.brake.controller import Controller
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plain.suspension import Suspension, WheelForces
 from models.brake.pressure import Chambers
-from models.brake.sprung import Sprung, sprung
+from models.brake.sprung import Sprung, suspended_vehicle
 from models.brake.surfaces import UNIFORM_ROAD, Stretch, road
 from models.engines.braking_sprung import OnSprings
 from models.engines.braking_sprung_plain import PlainOnSprings
-from models.systems.braking.march import Braked, BrakingPath, on_tyres
+from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
 from models.systems.braking.procedures import steady_turn
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.compiled_brakes import in_engine, wheel_forces_in
@@ -24,17 +24,17 @@ from validation.braking.sprung_box import SPIN, car, steady_torques
 from validation.spatial.cars import twin
 from validation.spatial.trains import caravan, train
 
-STATES, SEED = 100, 22
-LENGTHS = np.array([0.4, 0.4, 0.3, 0.3])
+STATE_COUNT, SEED = 100, 22
+RELAXATION_LENGTHS = np.array([0.4, 0.4, 0.3, 0.3])
 """m, over which tyres relax where they do; those of what is towed as the last one."""
-LEAN = 0.3
+LARGEST_LEAN = 0.3
 """rad: largest roll and pitch of the states."""
 
 
 @cache
-def asymmetric() -> Sprung:
+def asymmetric_twin() -> Sprung:
     """The twin without any symmetry."""
-    return sprung(twin(), SPIN)
+    return suspended_vehicle(twin(), SPIN)
 
 
 @cache
@@ -49,29 +49,29 @@ def car_with_stops() -> Sprung:
         for s in whole.springs
     )
     tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(whole.tyres))
-    return sprung(replace(whole, springs=springs, tyres=tyres), SPIN)
+    return suspended_vehicle(replace(whole, springs=springs, tyres=tyres), SPIN)
 
 
 @cache
-def towing() -> Sprung:
+def towing_car() -> Sprung:
     """The car with the caravan on its ball, without drag."""
-    return sprung(replace(caravan(), drags=()), SPIN)
+    return suspended_vehicle(replace(caravan(), drags=()), SPIN)
 
 
 @cache
 def in_row() -> Sprung:
     """The twin with a trailer made of a drawbar and a box, all without symmetry."""
-    return sprung(train(), SPIN)
+    return suspended_vehicle(train(), SPIN)
 
 
 @cache
 def compiled_springs() -> Sprung:
     """The twin with its trailer, with all springs computed by the compiled force function."""
-    return sprung(train(), SPIN, forces="compiled")
+    return suspended_vehicle(train(), SPIN, forces="compiled")
 
 
-VEHICLES = {"car": car, "twin": asymmetric, "bent": car_with_stops}
-TRAINS = {"caravan": towing, "train": in_row, "compiled train": compiled_springs}
+VEHICLES = {"car": car, "twin": asymmetric_twin, "bent": car_with_stops}
+TRAINS = {"caravan": towing_car, "train": in_row, "compiled train": compiled_springs}
 EVERY_VEHICLE = {**VEHICLES, **TRAINS}
 
 
@@ -80,13 +80,16 @@ def wheels_of(vehicle: Sprung) -> int:
     return len(vehicle.handling.vehicle.tyres)
 
 
-def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
+def states(size: int, count: int = STATE_COUNT, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
     """Random coordinates and rates (count, 2, size) at any heading, and the random quantities held constant at their
     wheels."""
     random = np.random.default_rng(SEED)
     both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
     both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
-    both[:, 0, 4:6], both[:, 1, :2] = random.uniform(-LEAN, LEAN, (count, 2)), random.normal(0.0, 15.0, (count, 2))
+    both[:, 0, 4:6], both[:, 1, :2] = (
+        random.uniform(-LARGEST_LEAN, LARGEST_LEAN, (count, 2)),
+        random.normal(0.0, 15.0, (count, 2)),
+    )
     kept = [
         WheelForces(
             random.normal(0.0, 0.2, wheels), random.normal(0.0, 3e3, (wheels, 2)), random.normal(0.0, 300.0, wheels)
@@ -97,20 +100,24 @@ def states(size: int, count: int = STATES, wheels: int = 4) -> tuple[np.ndarray,
 
 
 @cache
-def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
+def plain_accelerations(vehicle: str, count: int = STATE_COUNT) -> np.ndarray:
     """Accelerations (count, n) at the states of ``states``, by plain code."""
     suspension = Suspension(EVERY_VEHICLE[vehicle]())
     both, kept = states(suspension.size, count, len(suspension.tyres))
     return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
 
 
-def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
+def accelerations(vehicle: Sprung, engine: str, count: int = STATE_COUNT) -> np.ndarray:
     """Accelerations (count, n) at the states of ``states``, by an engine that calls the compiled forces."""
     model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
     wheels = wheels_of(vehicle)
     rows = wheel_forces_in(model.numbers, wheels)
     for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count, wheels), strict=True)):
-        rows.steer[:], rows.forces[:], rows.spun[:] = kept_state.steer, kept_state.forces, kept_state.spun
+        rows.steer[:], rows.forces[:], rows.spin_moments[:] = (
+            kept_state.steer,
+            kept_state.forces,
+            kept_state.spin_moments,
+        )
         computed[i] = model.acceleration(0.0, *state)
     return computed
 
@@ -122,9 +129,9 @@ def relative_difference(compiled: np.ndarray, plain: np.ndarray) -> float:
     return off if np.isfinite(off) else np.inf
 
 
-def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> Braked:
+def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> BrakedVehicle:
     """A vehicle steered to the left, with hysteresis in its brakes. Its road is dry on the left and wet on the right
-    for 3 m, then ice; lags: whether its tyres have the relaxation lengths LENGTHS."""
+    for 3 m, then ice; lags: whether its tyres have the relaxation lengths RELAXATION_LENGTHS."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
@@ -133,7 +140,7 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
     each, ahead = np.ones(plane.wheels), np.arange(plane.wheels) < 2
     return on_tyres(
         plane,
-        [surface(name) for name in ("wet", "dry", "ice")],
+        [table_of_surface(name) for name in ("wet", "dry", "ice")],
         of_wheels(front, front, *[rear] * (plane.wheels - 2)),
         Chambers(0.05 * each, 0.04 * each, 6.0, 0.5 * each, 200.0, 3e-3),
         road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
@@ -141,7 +148,7 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -
         substeps=2,
         engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
         sprung=vehicle,
-        relaxation=np.where(ahead, LENGTHS[0], LENGTHS[-1]) if lags else None,
+        relaxation=np.where(ahead, RELAXATION_LENGTHS[0], RELAXATION_LENGTHS[-1]) if lags else None,
     )
 
 
@@ -177,7 +184,7 @@ def paths_apart(first: BrakingPath, other_path: BrakingPath) -> float:
     return off if np.isfinite(off) else np.inf
 
 
-def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+def circles_of_both_sides(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
     """Steady circle at a speed (m/s) and radius (m), by the engine's forces and by plain code. Each row has steer
     angles, wheel speeds and state; NaN where no steady turn exists."""
     rows = []

@@ -16,8 +16,8 @@ from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import Quarter, QuarterStop, braked
 from models.brake.surfaces import UNIFORM_ROAD
 from models.machine.compiled import njit
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked_tables
 
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)
@@ -69,7 +69,7 @@ def rates(u, w, torque, quarter, curve):
 
 
 @njit(cache=True, error_model="numpy")
-def literal(u, w, torque, quarter, curve, step):
+def literal_step(u, w, torque, quarter, curve, step):
     """Speed and angular velocity after one step of the scheme as printed in the paper."""
     mass, radius, inertia = quarter
     force, slip = force_at(u, w, quarter, curve)
@@ -80,13 +80,13 @@ def literal(u, w, torque, quarter, curve, step):
 
 
 @njit(cache=True, error_model="numpy")
-def advanced(scheme, u, w, torques, quarter, curve, step):
+def advanced_by_scheme(scheme, u, w, torques, quarter, curve, step):
     """Speed and angular velocity after one step of a scheme (0 Euler, 1 RK4, 2 literal), with brake torques (N m) at
     the step's start and end."""
     now, then = torques
     middle = 0.5 * (now + then)
     if scheme == 2:
-        return literal(u, w, middle, quarter, curve, step)
+        return literal_step(u, w, middle, quarter, curve, step)
     a, b = rates(u, w, now, quarter, curve)
     if scheme == 0:
         return u + step * a, w + step * b
@@ -106,7 +106,7 @@ def march(scheme, u, w, torques, quarter, road, step):
     x = 0.0
     for n in range(torques.size - 1):
         curve = road.before if x < road.place else road.behind
-        after, turning = advanced(scheme, u, w, (torques[n], torques[n + 1]), quarter, curve, step)
+        after, turning = advanced_by_scheme(scheme, u, w, (torques[n], torques[n + 1]), quarter, curve, step)
         if after <= 0.0:
             return x + 0.5 * u * step * u / (u - after), n + 1, 0.0
         x += 0.5 * step * (u + after)
@@ -123,7 +123,7 @@ def marched_quarter(
     return way, steps, left
 
 
-def stopped(
+def stopping_distance(
     scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
 ) -> tuple[float, float]:
     """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from a speed (m/s) with a rolling wheel.
@@ -165,17 +165,17 @@ def exact_distance(quarter: Quarter, tyre: TyreTable, torque: float, speed: floa
     return float(way + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))
 
 
-FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
+FRONT_WHEEL = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""
-STEP = 5.5e-3
+PAPER_STEP = 5.5e-3
 """The paper's step (s)."""
 
 
 @cache
 def friction_table(surface_name: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
     """Tyre table of a surface, both as an object and in the form for compiled functions."""
-    tyre = surface(surface_name, scale)
-    return tyre, stacked([tyre])
+    tyre = table_of_surface(surface_name, scale)
+    return tyre, stacked_tables([tyre])
 
 
 def steady_torque(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
@@ -184,12 +184,12 @@ def steady_torque(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float
     return force, quarter.steady_torque(slip, force)
 
 
-def stop(
+def constant_torque_stop(
     quarter: Quarter,
     tyre: tuple[TyreTable, Tables],
     torque: float,
     speed: float,
-    step: float = STEP,
+    step: float = PAPER_STEP,
     after: float = 0.0,
     turning: float | None = None,
 ) -> QuarterStop:

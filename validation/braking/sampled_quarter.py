@@ -16,7 +16,7 @@ from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import APPLY, RELEASE, Chambers
 from models.brake.quarter import Quarter
 from models.systems.braking.march import on_tyres
-from models.tyre.magic_formula import SURFACES, surface
+from models.tyre.magic_formula import NAMED_SURFACES, table_of_surface
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
 LAST_SPEED = 0.06
@@ -30,7 +30,7 @@ def own_distance(
 ) -> float:
     """Stopping distance (m) by twinrig's time step."""
     chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
-    vehicle = on_tyres(quarter.plane, [surface(surface_name)], of_wheels(brake), chambers, substeps=substeps)
+    vehicle = on_tyres(quarter.plane, [table_of_surface(surface_name)], of_wheels(brake), chambers, substeps=substeps)
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 
@@ -38,7 +38,7 @@ def reference_distance(
     quarter: Quarter, brake: Brake, surface: str, controller: Controller, speed: float, tolerance: float = 1e-10
 ) -> float:
     """Stopping distance (m) by an adaptive reference solver, at a relative tolerance."""
-    curve = SURFACES[surface][0]
+    curve = NAMED_SURFACES[surface][0]
     return tight_distance(quarter, brake, [(0.0, lambda s: float(curve(np.array(s))))], controller, speed, tolerance)
 
 

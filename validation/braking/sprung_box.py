@@ -7,12 +7,12 @@ import numpy as np
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Pressures
-from models.brake.plane_records import REPORTED, PlaneMotion
+from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers
-from models.brake.sprung import Sprung, sprung
+from models.brake.sprung import Sprung, suspended_vehicle
 from models.engines.braking_sprung import OnSprings
-from models.systems.braking.march import Braked, BrakingPath, on_tyres
+from models.systems.braking.march import BrakedVehicle, BrakingPath, on_tyres
 from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
@@ -20,12 +20,12 @@ from models.vehicles.vehicle_file import load_vehicle
 HALF, SIDE, RADIUS = 1.3, 0.7, 0.3
 SPRING, TYRE, DAMPER = 3e4, 2e5, 2e3
 SPIN = 1.7
-TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
-LOCKS = 1e5
+INERTIA_TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
+LOCKING_TORQUE = 1e5
 """Torque (N m) that locks a wheel at once."""
 SUPPLY = 6.0
 """bar"""
-GRADIENT = 2e4
+TORQUE_PER_BAR = 2e4
 """Torque by pressure (N m/bar) of brakes whose torques are given."""
 
 
@@ -39,11 +39,11 @@ def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
         for y, v in (("l", 1.0), ("r", -1.0))
     }
     up: Vector = (0.0, 0.0, 1.0)
-    return sprung(
+    return suspended_vehicle(
         SpatialVehicle(
             "box",
             (
-                Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, TENSOR),
+                Body("chassis", 1000.0, (0.0, 0.0, 0.55), FREEDOMS, INERTIA_TENSOR),
                 *(Body(name, 30.0, at, ("z",)) for name, at in wheels.items()),
             ),
             tuple(
@@ -63,7 +63,7 @@ def box(stiffer: float = 1.0, spin_inertia: float = SPIN) -> Sprung:
 @cache
 def car() -> Sprung:
     """The car of 19 freedoms, without drag."""
-    return sprung(replace(load_vehicle("r19_free"), drags=()), SPIN)
+    return suspended_vehicle(replace(load_vehicle("r19_free"), drags=()), SPIN)
 
 
 def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
     return pitch, stiffness * pitch / plane.wheelbase
 
 
-def constant(mu: float) -> TyreTable:
+def constant_friction(mu: float) -> TyreTable:
     """Tyre table in which a sliding wheel has the same friction in every direction, and a rolling wheel has none."""
     slips, angles = np.array([0.0, 0.01, 1.0]), np.array([0.0, 0.01, np.pi / 2.0])
     ahead, aside = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.01, 1.0])
@@ -87,19 +87,19 @@ def constant(mu: float) -> TyreTable:
 
 
 def steady_torques(*torques: float) -> Pressures:
-    """Constant brake torques (W,) in N m of the runs of ``braked``."""
-    return Pressures(np.array(torques) / GRADIENT)
+    """Constant brake torques (W,) in N m of the runs of ``braked_vehicle``."""
+    return Pressures(np.array(torques) / TORQUE_PER_BAR)
 
 
-def braked(
+def braked_vehicle(
     sprung: Sprung,
     tyre: TyreTable,
     engine: str | None = "mujoco",
     steer: float = 0.0,
     step: float = 5.5e-3,
     substeps: int = 1,
-    gradient: float = GRADIENT,
-) -> Braked:
+    gradient: float = TORQUE_PER_BAR,
+) -> BrakedVehicle:
     """The vehicle on one surface, with brakes that follow their command at once. Without an engine it is the plane
     vehicle.
 
@@ -120,9 +120,9 @@ def braked(
     )
 
 
-def stays(vehicle: Braked, path: BrakingPath, duration: float = 2.0) -> float:
+def remaining_speed(vehicle: BrakedVehicle, path: BrakingPath, duration: float = 2.0) -> float:
     """Largest speed (m/s) of the vehicle or of a wheel's rim during a time (s) after a stop."""
-    rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORTED, vehicle.plane.wheels))
+    rates, report = np.zeros(2 + vehicle.plane.masses.size), np.zeros((REPORT_SIZE, vehicle.plane.wheels))
     motion = PlaneMotion(path.states[-1].copy(), path.turning[-1].copy(), rates, report)
     torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0
     for _ in range(round(duration / vehicle.sample)):

@@ -16,10 +16,10 @@ from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.systems.braking.march import BrakingPath
 from models.vehicles.spatial import SpatialVehicle, hitch_of
-from validation.braking.plain_sprung import towing
-from validation.braking.sprung_box import LOCKS, SPIN, braked, constant, steady_torques
+from validation.braking.plain_sprung import towing_car
+from validation.braking.sprung_box import LOCKING_TORQUE, SPIN, braked_vehicle, constant_friction, steady_torques
 
-SLIPPERY, GRIP = 0.05, 0.1
+LOCKED_FRICTION, CARAVAN_FRICTION = 0.05, 0.1
 """Friction under wheels that all lock, and under those of a caravan that brakes alone."""
 SETTLED_SHARE = 0.4
 """Share of a stop over whose end a deceleration and loads are taken: springs and hitch are at rest before."""
@@ -38,8 +38,10 @@ class PulledCaravan:
 def locked_stop(speed: float = 1.5) -> tuple[float, float]:
     """Stopping distance (m) from a speed (m/s) with all wheels locked, and the distance by friction alone, v^2 / (2 mu
     g)."""
-    path = braked(towing(), constant(SLIPPERY)).run(steady_torques(*6 * (LOCKS,)), speed)
-    return float(path.states[-1, 0, 0]), speed**2 / (2.0 * SLIPPERY * GRAVITY)
+    path = braked_vehicle(towing_car(), constant_friction(LOCKED_FRICTION)).run(
+        steady_torques(*6 * (LOCKING_TORQUE,)), speed
+    )
+    return float(path.states[-1, 0, 0]), speed**2 / (2.0 * LOCKED_FRICTION * GRAVITY)
 
 
 def pulled_by_levers() -> PulledCaravan:
@@ -51,16 +53,16 @@ def pulled_by_levers() -> PulledCaravan:
 
         l N + h mu N + d m2 a = c m2 g.
     """
-    vehicle = towing().handling.given
+    vehicle = towing_car().handling.given
     (name,) = vehicle.towed
     car, behind = _mass(vehicle, None), _mass(vehicle, name)
     hitch, axle = np.array(vehicle.body(hitch_of(name)).position), vehicle.axles[2]
     rolling = sum(SPIN / tyre.point[2] ** 2 for tyre in vehicle.tyres if tyre.axle < 2)
     whole = car[0] + behind[0] + rolling
     back, above = hitch[0] - behind[1], behind[2] - hitch[2]
-    arm = hitch[0] - axle + GRIP * (hitch[2] + above * behind[0] / whole)
+    arm = hitch[0] - axle + CARAVAN_FRICTION * (hitch[2] + above * behind[0] / whole)
     load = back * behind[0] * GRAVITY / arm
-    slowing = GRIP * load / whole
+    slowing = CARAVAN_FRICTION * load / whole
     return PulledCaravan(slowing, load, (car[0] + rolling) * slowing)
 
 
@@ -73,21 +75,23 @@ def _mass(vehicle: SpatialVehicle, towed: str | None) -> tuple[float, float, flo
     return float(masses.sum()), float(x), float(z)
 
 
-def pulled(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
+def pulled_caravan(change: Callable[[Handling], None] | None = None, duration: float = 4.0) -> PulledCaravan:
     """A run in MuJoCo of a train of which only the caravan brakes, with all its wheels locked; change: plants a fault
     in the table."""
-    vehicle = towing() if change is None else towing.__wrapped__()
+    vehicle = towing_car() if change is None else towing_car.__wrapped__()
     if change is not None:
         change(vehicle.handling)
-    path = braked(vehicle, constant(GRIP)).run(steady_torques(0.0, 0.0, 0.0, 0.0, LOCKS, LOCKS), 8.0, duration)
+    path = braked_vehicle(vehicle, constant_friction(CARAVAN_FRICTION)).run(
+        steady_torques(0.0, 0.0, 0.0, 0.0, LOCKING_TORQUE, LOCKING_TORQUE), 8.0, duration
+    )
     late = slice(-int(SETTLED_SHARE * len(path.times)), None)
     times, speeds = path.times[late], path.states[late, 1, 0]
     slowing = float(speeds[0] - speeds[-1]) / float(times[-1] - times[0])
     load = float(path.reports.load[late, 4:].sum(axis=1).mean())
-    return PulledCaravan(slowing, load, _pull(vehicle, path, late, slowing))
+    return PulledCaravan(slowing, load, _ball_force(vehicle, path, late, slowing))
 
 
-def _pull(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
+def _ball_force(vehicle: Sprung, path: BrakingPath, late: slice, slowing: float) -> float:
     """Longitudinal force (N) at the ball from the caravan's balance: tyre drag minus mass times deceleration."""
     mass, _, _ = _mass(vehicle.handling.given, vehicle.handling.given.towed[0])
     return -float(path.reports.force_x[late, 4:].sum(axis=1).mean()) - mass * slowing
@@ -100,9 +104,9 @@ def hold_on_to_the_car(car: Handling) -> None:
 
 
 @cache
-def errors() -> PulledCaravan:
+def caravan_errors() -> PulledCaravan:
     """Relative differences between the simulated train of which only the caravan brakes and its closed form."""
-    return relative_difference(pulled(), pulled_by_levers())
+    return relative_difference(pulled_caravan(), pulled_by_levers())
 
 
 def relative_difference(run: PulledCaravan, expected: PulledCaravan) -> PulledCaravan:

@@ -16,7 +16,7 @@ from models.tyre.tyre_table import TyreTable
 SOLVER_TOLERANCE = 1e-9
 
 
-class Turned(NamedTuple):
+class TurnEnd(NamedTuple):
     """Position x, y (m), heading (rad) and time (s) of a vehicle at the end of a braked turn."""
 
     x: float
@@ -33,7 +33,7 @@ def braked_turn(
     speed: float,
     until: float,
     length: float = 0.0,
-) -> Turned:
+) -> TurnEnd:
     """Final position of a braked turn from steady rolling at ``speed`` down to ``until`` (m/s). The front wheels are
     steered by an angle (rad); torques: brake torques of the two axles (N m).
 
@@ -54,7 +54,7 @@ def braked_turn(
     if not solution.success or not solution.t_events[0].size:
         raise RunFailed("written", "the vehicle does not slow down", float(solution.t[-1]))
     x, y, heading = solution.y_events[0][0][:3]
-    return Turned(float(x), float(y), float(heading), float(solution.t_events[0][0]))
+    return TurnEnd(float(x), float(y), float(heading), float(solution.t_events[0][0]))
 
 
 class _Equations:
@@ -95,8 +95,8 @@ class _Equations:
     def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Longitudinal friction mu_x with the sign of the slip, and lateral friction mu_y."""
         tyre = self.tyre
-        i, p = _cell(tyre.angles, angles)
-        k, w = _cell(tyre.slips, np.abs(slips))
+        i, p = _cells_of_values(tyre.angles, angles)
+        k, w = _cells_of_values(tyre.slips, np.abs(slips))
 
         def mean(table: np.ndarray) -> np.ndarray:
             low, high = (1 - w) * table[i, k] + w * table[i, k + 1], (1 - w) * table[i + 1, k] + w * table[i + 1, k + 1]
@@ -106,7 +106,7 @@ class _Equations:
         return np.sign(slips) * mean(tyre.mu_x[:, 0, :]), mean(tyre.g) * ((1 - p) * h[i] + p * h[i + 1])
 
 
-def _cell(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cells_of_values(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """For each value, the index of the cell between nodes in which it lies, and its relative position in the cell."""
     cell = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
     return cell, (values - nodes[cell]) / (nodes[cell + 1] - nodes[cell])

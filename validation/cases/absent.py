@@ -8,18 +8,25 @@ from typing import Any
 
 import numpy as np
 
-from models.core.scene_effects import module_of, names_of, without
+from models.core.scene_effects import module_of, names_of, scene_without
 from models.core.systems import DEFAULT_SYSTEM
 from models.core.time_series import write_time_series
 from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
-from validation.absence.probes import belongs_to_effects, installed, leanest_march, march, probe, user_functions
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
+from validation.absence.probes import (
+    belongs_to_effects,
+    installed_callbacks,
+    leanest_march,
+    march,
+    probe,
+    user_functions,
+)
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
 
 TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
@@ -70,7 +77,7 @@ def write_files(folder: Path) -> None:
 
 def model(bare: Scene, engine: str) -> Model:
     """An engine's model of a scene."""
-    return build(engine, assemble(bare), settings_of(bare, engine))
+    return build(engine, assembly_of_scene(bare), settings_of(bare, engine))
 
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
@@ -78,7 +85,7 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     base, guided, module = added_to(effect), effect.startswith("prescribed"), module_of(DEFAULT_SYSTEM, effect)
     less = scene(base, steps, folder, guided)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
-        return without(less, effect), less
+        return scene_without(less, effect), less
     return less, scene({**base, effect: module.EXAMPLE}, steps, folder, guided)
 
 
@@ -99,7 +106,7 @@ def declared(effect: str, engine: str) -> dict[str, int]:
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 
-@allowing("what is computed is what is counted, whatever the vehicle does meanwhile")
+@allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All counts of absence, with a positive control of every effect; a quick run has each control in one engine,
     those of the vehicle in turn and of other systems every third, and one process that looks for what is imported.
@@ -141,7 +148,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
     for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
         march(engine, model(bare, engine))
     short, long = (leanest_march(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
-    callbacks = max(short.callbacks, installed())
+    callbacks = max(short.callbacks, installed_callbacks())
     if engine == "exudyn":
         callbacks += user_functions(model(scene({}, 20, folder), engine))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
@@ -157,7 +164,7 @@ def _absence(engine: str, folder: Path) -> list[Row]:
             f"absent.memory.{engine}",
             SYSTEM,
             f"{engine}: memory that 1,980 more steps take beyond their result",
-            long.memory - short.memory,
+            long.peak_bytes - short.peak_bytes,
             "B",
         ).at_most(1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
         Observed(
@@ -170,7 +177,7 @@ def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row
     """Rows of positive controls: each effect changes the counts of every engine by exactly what it declares."""
     changed = {engine: change(effect, engine, folder) for engine in engines}
     wanted = {engine: declared(effect, engine) for engine in engines}
-    return behaves(
+    return behaviour_row(
         f"absent.present.{effect}",
         SYSTEM,
         f"counts that the effect {effect} adds to a bare scene",

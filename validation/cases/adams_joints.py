@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.own_model.certificate import ALIKE
+from models.own_model.certificate import EQUAL_ACCELERATION_SHARE
 from validation.adams_joints.constrained import ConstrainedBody
 from validation.adams_joints.joint_tree import joint_tree
 from validation.adams_joints.mechanism import Mechanism, read_mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction
 from validation.adams_joints.output_file import OutputFile, read_output, starts_with_mechanism
-from validation.adams_joints.twin_model import examined
+from validation.adams_joints.twin_model import build_differences
 from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 
@@ -88,7 +88,7 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     moved = mechanism if starts_with_mechanism(mechanism, output) else mechanism.moved(shift)
     (spring,) = moved.springs
     travel, rate, law = _sprung(moved, output)
-    told = spring.stiffness * (travel - spring.rest) + spring.damping * rate
+    told = spring.stiffness * (travel - spring.free_length) + spring.damping * rate
     if moved is mechanism and np.abs(told - law).max() <= FORCE_BOUND * np.abs(law).max():
         return mechanism, {}
     early = output.times <= READ_OFF_SECONDS
@@ -152,12 +152,12 @@ def own_model_rows(family: str, mechanism: Mechanism, folder: Path, duration: fl
     """Rows for the joint as an MJCF model: the certificate of ``twinrig twin``, and paths compared with those of
     constraint equations."""
     step, every = STEP / JOINT_STEPS, JOINT_STEPS * STEPS_PER_ROW
-    accelerations, paths = examined(mechanism, folder, round(duration / step), step)
+    accelerations, paths = build_differences(mechanism, folder, round(duration / step), step)
     motion, _ = ConstrainedBody(mechanism).run(duration, step, every)
     quantity = f"{family} in MJCF: accelerations of all builds from the file as MuJoCo parsed it"
     said = "rounding; the bound asked for"
     alike = Observed(_id(family, "mjcf.accelerations"), SYSTEM, quantity, accelerations, "of the largest")
-    rows: list[Row] = [alike.at_most(ALIKE, said, "native")]
+    rows: list[Row] = [alike.at_most(EQUAL_ACCELERATION_SHARE, said, "native")]
     for name, places in paths.items():
         off = float(np.abs(places[::every] - motion.place).max())
         quantity = f"{family} in MJCF: position of the centre from the reference with constraints, {name}"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common import checks
 from validation.common.checks import acceleration_gap
@@ -29,7 +29,7 @@ def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
     """Largest difference of an engine's accelerations from the reference over all states, divided by the largest
     acceleration."""
     audited = scene(parameters, geometry)
-    return acceleration_gap(checks.engine(engine), assemble(audited), settings_of(audited, engine), STATES)
+    return acceleration_gap(checks.engine(engine), assembly_of_scene(audited), settings_of(audited, engine), STATES)
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:

@@ -8,14 +8,14 @@ import numpy as np
 
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
-from models.bicycle.suspects import chosen, deviations, predicted
+from models.bicycle.suspects import forecast_deviations, predicted_weave, ranked_suspects
 from models.bicycle.weave import Observation, observations
 from models.bicycle.whipple import Control, Whipple, load_bicycle
 from models.core.errors import RunFailed
 from models.identification.subsets import Choice
 from models.systems.bicycle.run import engine_eigenvalues, run
 from models.systems.bicycle.scene import build
-from validation.common.bicycle_published import CAPSIZE_SPEED, MATRICES, PUBLISHED, WEAVE_SPEED
+from validation.common.bicycle_published import CAPSIZE_SPEED, PUBLISHED_EIGENVALUES, PUBLISHED_MATRICES, WEAVE_SPEED
 from validation.common.rows import Observed, Row, System, Table, not_run
 
 TITLE = "A bicycle: benchmark and measured"
@@ -75,9 +75,9 @@ def _order(gaps: list[float], i: int) -> str:
 
 def _published_rows(bicycle: Whipple) -> list[Row]:
     M, C1, K0, K2 = bicycle.linear
-    matrices = zip((M, C1, bicycle.gravity * K0, K2), MATRICES.values(), strict=True)
+    matrices = zip((M, C1, bicycle.gravity * K0, K2), PUBLISHED_MATRICES.values(), strict=True)
     off = max(float(np.abs(here - there).max()) for here, there in matrices)
-    values = max(float(np.abs(bicycle.eigenvalues(v) - there).max()) for v, there in PUBLISHED.items())
+    values = max(float(np.abs(bicycle.eigenvalues(v) - there).max()) for v, there in PUBLISHED_EIGENVALUES.items())
     critical = max(abs((bicycle.weave_speed or 0.0) - WEAVE_SPEED), abs((bicycle.capsize_speed or 0.0) - CAPSIZE_SPEED))
     given = (
         ("matrices", "M, C1, g K0, K2 of the benchmark bicycle: largest difference", off, "kg m^2 and so on"),
@@ -94,7 +94,7 @@ def _published_rows(bicycle: Whipple) -> list[Row]:
 def _fault_rows(bicycle: Whipple) -> list[Row]:
     """Row: a trail that is 0.1 % longer must be told apart from the published bicycle."""
     wrong = bicycle.changed(trail=FAULT * bicycle.trail)
-    caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED[SPEED]).max())
+    caught = float(np.abs(wrong.eigenvalues(SPEED) - PUBLISHED_EIGENVALUES[SPEED]).max())
     said = "trail a thousandth longer: largest change of an eigenvalue by what the published figures allow (1e-12 1/s)"
     seen = Observed("bicycle.published.fault", SYSTEM, said, min(caught / 1e-12, 1e6), "")
     return [seen.within(1e6, 1e-3, "a planted fault must be seen by far; counted up to a million", "closed form")]
@@ -176,14 +176,16 @@ def _measured(quick: bool) -> tuple[list[Row], list[list[str]]]:
     rows, table = [], []
     for observation in seen:
         rows += _unfitted_rows(bicycle, observation)
-        by = None if quick else chosen(bicycle, FEEDBACK, [other for other in seen if other is not observation])
+        by = (
+            None if quick else ranked_suspects(bicycle, FEEDBACK, [other for other in seen if other is not observation])
+        )
         rows += [] if by is None else _predicted_rows(bicycle, by, observation)
         table.append(_line(bicycle, by, observation))
-    return [*rows, *_choice_rows(chosen(bicycle, FEEDBACK, seen))], table
+    return [*rows, *_choice_rows(ranked_suspects(bicycle, FEEDBACK, seen))], table
 
 
 def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
-    model, mean, deviation = predicted(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
+    model, mean, deviation = predicted_weave(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
     at = f"{observation.speed:g} m/s, {len(observation.weave)} windows"
     damping = Observed(
         f"bicycle.measured.damping.{observation.speed:g}",
@@ -209,7 +211,7 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
 
 
 def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) -> list[Row]:
-    gaps = deviations(bicycle, FEEDBACK, choice, observation)
+    gaps = forecast_deviations(bicycle, FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
         "that were settled with all of these speeds in sight"
@@ -229,7 +231,9 @@ def _predicted_rows(bicycle: Whipple, choice: Choice, observation: Observation) 
 
 def _choice_rows(choice: Choice) -> list[Row]:
     """Rows: suspects that the data call for at a significance level of 5 %, and what the experimenters suspected."""
-    told = ", ".join(f"{name} {value:.3g}" for name, value in zip(choice.best.names, choice.best.values, strict=True))
+    told = ", ".join(
+        f"{name} {value:.3g}" for name, value in zip(choice.best_subset.names, choice.best_subset.values, strict=True)
+    )
     return [
         Observed(
             f"bicycle.suspects.{key}",
@@ -248,8 +252,8 @@ def _choice_rows(choice: Choice) -> list[Row]:
 
 
 def _line(bicycle: Whipple, choice: Choice | None, observation: Observation) -> list[str]:
-    model, mean, deviation = predicted(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
-    gaps = np.empty(0) if choice is None else deviations(bicycle, FEEDBACK, choice, observation)
+    model, mean, deviation = predicted_weave(bicycle, FEEDBACK, observation), observation.mean, observation.deviation
+    gaps = np.empty(0) if choice is None else forecast_deviations(bicycle, FEEDBACK, choice, observation)
     return [
         f"{observation.speed:g} m/s",
         f"{-mean[0]:.2f} +- {deviation[0]:.2f}",

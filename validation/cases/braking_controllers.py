@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 from scipy.stats import ttest_ind
 
-from models.brake.brake import PAPER_BRAKES, PAPER_FRONT, Brake, of_wheels, torques
+from models.brake.brake import PAPER_BRAKES, PAPER_FRONT, Brake, of_wheels, torques_of_pressures
 from models.brake.controller import SAMPLE
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle, sampled
-from models.brake.plane_vehicle import GRAVITY, PAPER, truck
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle, sampled_cycle
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, resting_chambers
 from models.systems.braking.march import BrakingPath as Recorded
 from models.systems.braking.march import on_tyres
 from models.systems.braking.stop_report import Stop
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from validation.braking.five_phase_exact import exact_cycle
-from validation.braking.quarter_stops import FRONT
+from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.braking.sampled_quarter import own_distance, reference_distance
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
@@ -77,7 +77,7 @@ def loop(brake: Brake, low: float, high: float, points: int = 2000) -> tuple[np.
     """Pressures (bar) and torques (N m) of one hysteresis loop from high to low pressure and back, after a first rise
     from zero."""
     path = np.concatenate((np.linspace(high, low, points), np.linspace(low, high, points)))
-    return path, torques(path, of_wheels(brake))
+    return path, torques_of_pressures(path, of_wheels(brake))
 
 
 def loop_area(brake: Brake, low: float, high: float) -> float:
@@ -98,7 +98,7 @@ def _loop_rows() -> list[Row]:
             p, t = loop(brake, low, 4.5)
             worst = max(worst, abs(-np.trapezoid(t, p) / loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
-    rise = torques(np.linspace(0.0, 0.75, 100), of_wheels(WIDE_BRAKE))
+    rise = torques_of_pressures(np.linspace(0.0, 0.75, 100), of_wheels(WIDE_BRAKE))
     return [
         Observed(
             "braking_controllers.loop",
@@ -107,7 +107,7 @@ def _loop_rows() -> list[Row]:
             worst,
             "",
         ).at_most(1e-3, "two lines and a hold between them", "closed form"),
-        behaves(
+        behaviour_row(
             "braking_controllers.push_out",
             SYSTEM,
             "brake torque at and below the push-out pressure",
@@ -115,7 +115,7 @@ def _loop_rows() -> list[Row]:
             "none",
             "the springs hold the shoes back",
         ),
-        behaves(
+        behaviour_row(
             "braking_controllers.sense",
             SYSTEM,
             "brake torque as the pressure falls and rises",
@@ -145,13 +145,13 @@ def _supply_row() -> Row:
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
-def _frozen(inertia: float = FRONT.spin_inertia) -> Frozen:
-    return Frozen(11.11, FRONT.mass * GRAVITY, FRONT.radius, inertia, LINE, surface("dry"))
+def _frozen(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
+    return WheelAtSpeed(11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINE, table_of_surface("dry"))
 
 
 def _cycle_rows(name: str) -> list[Row]:
     cycle, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
-    wrong = exact_cycle(_frozen(FRONT.spin_inertia * 1.001), PHASES[name])[0]
+    wrong = exact_cycle(_frozen(FRONT_WHEEL.spin_inertia * 1.001), PHASES[name])[0]
     return [
         Observed(
             f"braking_controllers.period_{name}",
@@ -167,7 +167,7 @@ def _cycle_rows(name: str) -> list[Row]:
             cycle.utilisation - used,
             "",
         ).at_most(1e-3, "as above", "closed form"),
-        behaves(
+        behaviour_row(
             f"braking_controllers.planted_{name}",
             SYSTEM,
             f"a planted error of 0.1 % in the spin inertia is noticed in the period, {name}",
@@ -180,7 +180,7 @@ def _cycle_rows(name: str) -> list[Row]:
             SYSTEM,
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {name}",
-            sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / cycle.period - 1.0,
+            sampled_cycle(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / cycle.period - 1.0,
             "",
         ).beside(0.0, "each switch comes up to a sample late", "native"),
     ]
@@ -189,7 +189,9 @@ def _cycle_rows(name: str) -> list[Row]:
 def truck_stop(surface_name: str, name: str, speed: float) -> Recorded:
     """The paper's truck on one surface under a controller with its defaults."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
-    return on_tyres(truck(PAPER), [surface(surface_name)], PAPER_BRAKES, chambers).run(CONTROLLERS[name](4), speed)
+    return on_tyres(plane_of_truck(PAPER_TRUCK), [table_of_surface(surface_name)], PAPER_BRAKES, chambers).run(
+        CONTROLLERS[name](4), speed
+    )
 
 
 def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
@@ -198,13 +200,18 @@ def stop(surface_name: str, name: str, speed: float) -> dict[str, float]:
     path = truck_stop(surface_name, name, speed)
     speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE))
-    used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(surface_name).mu_x.max()
+    used = (
+        (speed**2 - speeds[last] ** 2)
+        / (2.0 * path.states[last, 0, 0])
+        / GRAVITY
+        / table_of_surface(surface_name).mu_x.max()
+    )
     return {
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),
         "used": float(used),
         "locked": 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports.locked[:last].T),
-        "stands": float(path.stands),
+        "stands": float(path.ended_at_rest),
     }
 
 
@@ -223,7 +230,7 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
             max(each["locked"] for each in stops.values()),
             "ms",
         ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
-        behaves(
+        behaviour_row(
             "braking_controllers.stands",
             SYSTEM,
             f"how {len(stops)} stops of four controllers end",
@@ -237,9 +244,9 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
 def _substep_rows() -> list[Row]:
     rows = []
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
-        tight = reference_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
+        tight = reference_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
         for n in SUBSTEPS:
-            distance = own_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
+            distance = own_distance(FRONT_WHEEL, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(
                     f"braking_controllers.stop_{on}_{n}",
@@ -260,7 +267,10 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
     speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, runs)))
     distances = [
         np.array(
-            [own_distance(FRONT, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n) for speed in some]
+            [
+                own_distance(FRONT_WHEEL, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n)
+                for speed in some
+            ]
         )
         for some, n in zip(speeds, (4, fine), strict=True)
     ]

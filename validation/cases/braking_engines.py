@@ -10,21 +10,21 @@ import numpy as np
 from models.brake.advance import FINE, advance
 from models.brake.brake import PAPER_BRAKES
 from models.brake.controllers.slip import SlipBangBang
-from models.brake.plane_vehicle import PAPER
+from models.brake.plane_vehicle import PAPER_TRUCK
 from models.brake.pressure import Chambers
-from models.brake.trailer import CHOSEN, follow, hooked
+from models.brake.trailer import CHOSEN_TRAILER, follow_hook, plane_of_trailer
 from models.engines.braking import CarriedChassis
 from models.systems.braking.march import on_tyres
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
-    ICE,
-    PLANE,
+    ICE_TABLE,
+    PAPER_PLANE,
     RollingTruck,
     on_road,
     sideways_with_locked_front_wheels,
     transfer_errors,
 )
-from validation.braking.truck_equations import Turned, braked_turn
+from validation.braking.truck_equations import TurnEnd, braked_turn
 from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking in a turn, in engines and with a trailer"
@@ -40,8 +40,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Turn by all means, mirror image, straight way, trailer; the quick share turns down to 10 m/s only."""
     until = 10.0 if quick else LAST_SPEED
     compiled = turn(until)
-    beside = {"written out": braked_turn(PAPER, ICE, STEER, TORQUES, SPEED, until)}
-    beside |= {name: turn(until, step_function=CarriedChassis(name, PLANE).advance) for name in ("exudyn", "mujoco")}
+    beside = {"written out": braked_turn(PAPER_TRUCK, ICE_TABLE, STEER, TORQUES, SPEED, until)}
+    beside |= {
+        name: turn(until, step_function=CarriedChassis(name, PAPER_PLANE).advance) for name in ("exudyn", "mujoco")
+    }
     rows = [
         Observed(
             f"braking_engines.{name.replace(' ', '_')}",
@@ -71,11 +73,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {name: list(where) for name, where in turns.items()}
 
 
-def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> Turned:
+def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] = advance) -> TurnEnd:
     """A braked turn of the truck on ice from SPEED down to ``until`` (m/s). Its end is interpolated linearly within the
     last step."""
     truck = RollingTruck(
-        on_road(PLANE, stacked([ICE]), slope=ICE.cornering), SPEED, steer=steer, step_function=step_function
+        on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering),
+        SPEED,
+        steer=steer,
+        step_function=step_function,
     )
     while True:
         passed, place, fast = truck.time, truck.state[0].copy(), truck.speed
@@ -83,13 +88,13 @@ def turn(until: float, steer: float = STEER, step_function: Callable[..., Any] =
         if status != FINE or truck.speed <= until:
             share = (fast - until) / (fast - truck.speed)
             x, y, heading = (float(value) for value in place + share * (truck.state[0] - place))
-            return Turned(x, y, heading, float(passed + share * used))
+            return TurnEnd(x, y, heading, float(passed + share * used))
 
 
 def speed(steps: int) -> float:
     """Simulated seconds of a straight stop per second of processor time."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
-    vehicle = on_tyres(PLANE, [ICE], PAPER_BRAKES, chambers, substeps=steps)
+    vehicle = on_tyres(PAPER_PLANE, [ICE_TABLE], PAPER_BRAKES, chambers, substeps=steps)
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), SPEED)
@@ -119,7 +124,7 @@ def _load_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows(until: float, steered: Turned) -> list[Row]:
+def _symmetry_rows(until: float, steered: TurnEnd) -> list[Row]:
     mirrored, straight = turn(until, -STEER), turn(until, 0.0)
     apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
     return [
@@ -140,7 +145,7 @@ def rolling(slope: float) -> Tables:
     """Tyre tables with lateral friction alone, which rises with a slope (1/rad) up to 0.01 rad."""
     mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
-    return stacked([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
+    return stacked_tables([TyreTable(*nodes, np.zeros((3, 1, 3)), np.ones((3, 3)), mu)])
 
 
 def _trailer_rows(quick: bool) -> list[Row]:
@@ -173,11 +178,17 @@ def straight_pull(angle: float = 0.5, v: float = 0.2, step: float = 5e-4, durati
     """Relative error of the drawbar angle psi after a straight pull, where tan(psi / 2) = tan(psi_0 / 2) exp(-v t /
     L)."""
     n = round(duration / step)
-    state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN.drawbar, 0.0]])
-    states, _ = follow(
-        hooked(CHOSEN), rolling(STIFF_SLOPE), state, np.tile([v, 0.0], (n + 1, 1)), step, STIFF_SLOPE, np.zeros(4)
+    state = np.array([[0.0, 0.0, angle, angle], [v, 0.0, -v * np.sin(angle) / CHOSEN_TRAILER.drawbar, 0.0]])
+    states, _ = follow_hook(
+        plane_of_trailer(CHOSEN_TRAILER),
+        rolling(STIFF_SLOPE),
+        state,
+        np.tile([v, 0.0], (n + 1, 1)),
+        step,
+        STIFF_SLOPE,
+        np.zeros(4),
     )
-    exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN.drawbar))
+    exact = 2.0 * np.arctan(np.tan(angle / 2.0) * np.exp(-v * duration / CHOSEN_TRAILER.drawbar))
     return abs(float(states[-1, 0, 2] / exact - 1.0))
 
 
@@ -186,14 +197,18 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
     wheelbase^2."""
     turn, times = v / radius, step * np.arange(round(duration / step) + 1)
     hook = v * np.column_stack((-np.sin(turn * times), np.cos(turn * times)))
-    front = np.sqrt(radius**2 - CHOSEN.drawbar**2)
-    rear = np.sqrt(front**2 - CHOSEN.wheelbase**2)
-    first = np.pi / 2.0 - np.arcsin(CHOSEN.drawbar / radius)
-    state = np.array([[radius, 0.0, first, first - np.arcsin(CHOSEN.wheelbase / front)], [*hook[0], turn, turn]])
-    states, _ = follow(hooked(CHOSEN), rolling(STIFF_SLOPE), state, hook, step, STIFF_SLOPE, np.zeros(4))
+    front = np.sqrt(radius**2 - CHOSEN_TRAILER.drawbar**2)
+    rear = np.sqrt(front**2 - CHOSEN_TRAILER.wheelbase**2)
+    first = np.pi / 2.0 - np.arcsin(CHOSEN_TRAILER.drawbar / radius)
+    state = np.array(
+        [[radius, 0.0, first, first - np.arcsin(CHOSEN_TRAILER.wheelbase / front)], [*hook[0], turn, turn]]
+    )
+    states, _ = follow_hook(
+        plane_of_trailer(CHOSEN_TRAILER), rolling(STIFF_SLOPE), state, hook, step, STIFF_SLOPE, np.zeros(4)
+    )
     x, y, drawbar, body = states[-1, 0]
-    at = np.array([x, y]) - CHOSEN.drawbar * np.array([np.cos(drawbar), np.sin(drawbar)])
-    behind = at - CHOSEN.wheelbase * np.array([np.cos(body), np.sin(body)])
+    at = np.array([x, y]) - CHOSEN_TRAILER.drawbar * np.array([np.cos(drawbar), np.sin(drawbar)])
+    behind = at - CHOSEN_TRAILER.wheelbase * np.array([np.cos(body), np.sin(body)])
     return abs(float(np.hypot(*at) / front - 1.0)), abs(float(np.hypot(*behind) / rear - 1.0))
 
 

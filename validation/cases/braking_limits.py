@@ -11,19 +11,19 @@ import numpy as np
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import SLOW
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
+from models.brake.controllers.five_phase_cycle import WheelAtSpeed, limit_cycle
 from models.brake.controllers.slip import SlipPI
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers, by_valves, resting_chambers
-from models.brake.trailer import CHOSEN
+from models.brake.trailer import CHOSEN_TRAILER
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.random_stops import random_stop
-from validation.common.grounds import allowing
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow ones, and what cannot be"
 SYSTEM: System = "anti-lock"
@@ -37,7 +37,7 @@ ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=7
 """Phases that a fast first application leaves with a release that does not end by the wheel's acceleration."""
 
 
-@allowing("stops at the limits, and random ones: that they end, or say why not, is judged")
+@allowing_breaches("stops at the limits, and random ones: that they end, or say why not, is judged")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: three of the stops, one speed of the slow ones."""
     ends = [ending_text(number) for number in range(STOPS[quick])]
@@ -52,7 +52,7 @@ def ending_text(number: int) -> str:
         path = run(build(random_stop(SEED, number))).detail
     except RunFailed as error:
         return error.reason
-    return "" if path.stands else "does not stand"
+    return "" if path.ended_at_rest else "does not stand"
 
 
 def _stops_row(endings: list[str]) -> Row:
@@ -94,7 +94,7 @@ def _jackknife_row() -> Row:
                 "trailer": {"gradient": 1.0},
             },
             procedures={"p": {"kind": "turn", "speed": 12.0, "radius": 60.0}},
-            trailer=CHOSEN.model_copy(update={"fold": 1.0}).model_dump(),
+            trailer=CHOSEN_TRAILER.model_copy(update={"fold": 1.0}).model_dump(),
         )
     )
     kept = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
@@ -134,7 +134,7 @@ def _roll_rows() -> list[Row]:
             limit,
             "m/s^2",
         ).within(GRAVITY * track / (2.0 * height), 0.005, "g t / (2 h); printed to two digits", "closed form"),
-        behaves(
+        behaviour_row(
             "braking_limits.roll_over.kept",
             SYSTEM,
             "the path until the vehicle rolls over is kept",
@@ -163,7 +163,7 @@ def _slow_apply_row() -> Row:
 def _cycle_row() -> Row:
     """Row: limit cycle of the controller after a fast first application to a rolling wheel, compared with the exact
     cycle after a slow one."""
-    frozen = Frozen(20.0, 16900.0, 0.5, 13.35, LINE, surface("snow"))
+    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINE, table_of_surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
     return Observed(
@@ -221,7 +221,7 @@ def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"
-    return behaves(
+    return behaviour_row(
         f"braking_limits.refused.{name.replace(' ', '-')}",
         SYSTEM,
         f"a scene with {name} is refused",

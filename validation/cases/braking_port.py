@@ -19,14 +19,14 @@ import models.brake.port as port
 from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
-from models.brake.port.setup import ControllerRun, PortTable, opened
+from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
 from models.machine.timing import median
 from models.systems.braking.march import BrakingPath as Driven
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking import misbehaving_client
-from validation.common.grounds import allowing
-from validation.common.rows import Observed, Row, System, Table, behaves, not_run
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
@@ -75,7 +75,7 @@ ROUND = 100
 QUICK = ("NaN", "too few wheels", "silence", "died")
 
 
-@allowing("both sides are cut off after the same few samples", "stop")
+@allowing_breaches("both sides are cut off after the same few samples", "stop")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of bits, costs and faults; quick: half a second of braking, few faults."""
     ways = _tables_of_ways(folder, second=not quick)
@@ -154,14 +154,14 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
             rows.append(not_run(key, SYSTEM, what, table))
             continue
         ended = _compare_bits(first, run(_scene(folder, duration, table)).detail)
-        rows.append(behaves(key, SYSTEM, what, ended, "same bits", "doubles pass every way whole", "none"))
+        rows.append(behaviour_row(key, SYSTEM, what, ended, "same bits", "doubles pass every way whole", "none"))
     return [*rows, _pressures_move(first)]
 
 
 def _pressures_move(path: Driven) -> Row:
     """Row: pressures change direction often, since a controller that does nothing would give equal bits in any case."""
     turns = int((np.diff(np.sign(np.diff(path.pressures, axis=0)), axis=0) != 0).sum())
-    return behaves(
+    return behaviour_row(
         "braking_port.bits.alive",
         SYSTEM,
         f"the pressure changes direction often enough to tell controllers apart, here {turns} times",
@@ -187,7 +187,9 @@ def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> 
             for name, table in ways.items()
             if isinstance(table, dict)
         }
-        controllers = {name: stack.enter_context(opened(table, facts, Example(4)))[0] for name, table in tables.items()}
+        controllers = {
+            name: stack.enter_context(controller_of_run(table, facts, Example(4)))[0] for name, table in tables.items()
+        }
         for i in range(rounds):
             for name, controller in controllers.items():
                 seconds.setdefault(name, []).append(_timed(controller, i * ROUND))
@@ -212,7 +214,7 @@ def _process(kind: str, folder: Path) -> dict[str, Any]:
 
 def _class(kind: str, folder: Path) -> dict[str, Any]:
     name, does = CLASSES[kind]
-    well = f"        if given.number < {misbehaving_client.WELL}: return Command(valves=np.ones(4))\n"
+    well = f"        if given.number < {misbehaving_client.GOOD_SAMPLES}: return Command(valves=np.ones(4))\n"
     (folder / "fails.py").write_text(
         "import ctypes, os, signal, time\nimport numpy as np\nfrom models.brake.controller import Command\n"
         "class Fails:\n"
@@ -236,7 +238,10 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
 
     name, does = SLAVES[kind]
     line = "        wheels = np.array"
-    well = f"        if self._number == {misbehaving_client.WELL}:\n            import ctypes, os\n            {does}\n"
+    well = (
+        f"        if self._number == {misbehaving_client.GOOD_SAMPLES}:\n            import ctypes, os\n   "
+        f"         {does}\n"
+    )
     source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
     (folder / "fails_slave.py").write_text(source)
     return _failed(
@@ -276,13 +281,13 @@ class _Watch:
 
 
 def _fault_rows(fault: dict[str, Any]) -> list[Row]:
-    well = misbehaving_client.WELL
+    well = misbehaving_client.GOOD_SAMPLES
     slow = fault["name"] == fault["expected"] == "silence" and fault["number"] <= well  # a busy machine is silent, too
     whole = fault["kept"] == fault["number"] and (fault["number"] == well or slow)
     ended = fault["name"] if whole else f"{fault['name']} at {fault['number']}, {fault['kept']} samples kept"
     key = f"braking_port.fault.{_id(fault['kind'])}"
     return [
-        behaves(
+        behaviour_row(
             key,
             SYSTEM,
             f"end of a run whose controller fails, {fault['kind']}, after {well} samples that are kept",

@@ -16,14 +16,18 @@ ENGINES = ("mujoco", "exudyn")
 QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 """s of a stop, in the quick share and in the full one."""
 LAWS = {
-    "friction": (laws.frictions, 1e-12, "difference of the friction by stacked tables from each table on its nodes"),
+    "friction": (
+        laws.friction_of_random_states,
+        1e-12,
+        "difference of the friction by stacked tables from each table on its nodes",
+    ),
     "tyre": (
         laws.tyre_reports,
         1e-12,
         "difference of the forces, slips and rate of a braked wheel over a step from plain code",
     ),
     "road": (
-        laws.surfaces,
+        laws.random_surfaces,
         1e-12,
         "difference of the surfaces, and their shares, under wheels that pass seams and lines from plain code",
     ),
@@ -66,7 +70,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         f"braking_reference.accelerations.{vehicle}.{engine}",
         SYSTEM,
         f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
-        f"{whole.STATES} states of any heading",
+        f"{whole.STATE_COUNT} states of any heading",
         whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
     ).at_most(1e-12, WHY, "native")
@@ -86,7 +90,7 @@ def _relaxing_row() -> Row:
 
 
 def _turn_row(vehicle: str) -> Row:
-    computed, plain = whole.turns(whole.VEHICLES[vehicle]())
+    computed, plain = whole.circles_of_both_sides(whole.VEHICLES[vehicle]())
     return Observed(
         f"braking_reference.turn.{vehicle}",
         SYSTEM,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.systems.braking.march import BrakingPath as Run
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from validation.braking import plain_sprung as whole
-from validation.braking.sprung_box import box, braked, car, steady_torques
+from validation.braking.sprung_box import box, braked_vehicle, car, steady_torques
 from validation.common.rows import Observed, Row, System
 
 TITLE = "Relaxing tyres on the suspension"
@@ -46,12 +46,12 @@ def _rise_row(engine: str) -> Row:
 def rise_apart(engine: str, samples: int = 20) -> float:
     """Largest error of the rise of the slip angle's tangent, against its exponential, after a steer step at constant
     speed."""
-    slick = surface("wet").scaled(SLICK)
-    vehicle = replace(braked(car(), slick, engine, STEER), relaxation=whole.LENGTHS)
+    slick = table_of_surface("wet").scaled(SLICK)
+    vehicle = replace(braked_vehicle(car(), slick, engine, STEER), relaxation=whole.RELAXATION_LENGTHS)
     path = vehicle.run(steady_torques(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
     ways = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
     risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
-    return float(np.abs(risen - (1.0 - np.exp(-ways[:, None] / whole.LENGTHS[:2]))).max())
+    return float(np.abs(risen - (1.0 - np.exp(-ways[:, None] / whole.RELAXATION_LENGTHS[:2]))).max())
 
 
 def turn(engine: str | None, length: float, stiffer: float | None = None, duration: float = 0.2) -> Run:
@@ -59,7 +59,7 @@ def turn(engine: str | None, length: float, stiffer: float | None = None, durati
     length (m, 0 for none). Without an engine the vehicle is plane."""
     vehicle = car() if stiffer is None else box(stiffer, 0.01)
     torques, substeps = steady_torques(*TURNING), 2 if stiffer is None else 4
-    vehicle_on_tyres = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
+    vehicle_on_tyres = braked_vehicle(vehicle, table_of_surface("wet"), engine, 0.015, substeps=substeps)
     return replace(vehicle_on_tyres, relaxation=np.full(4, length) if length else None).run(torques, 10.0, duration)
 
 

@@ -10,17 +10,17 @@ import numpy as np
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import Quarter, QuarterStop, braked
 from models.brake.surfaces import UNIFORM_ROAD
-from models.tyre.magic_formula import SURFACES
+from models.tyre.magic_formula import NAMED_SURFACES
 from validation.braking.quarter_stops import (
-    FRONT,
+    FRONT_WHEEL,
     LONGEST_TIME_RATIO,
+    PAPER_STEP,
     SCHEMES,
-    STEP,
+    constant_torque_stop,
     exact_distance,
     friction_table,
     steady_torque,
-    stop,
-    stopped,
+    stopping_distance,
 )
 from validation.common.rows import Observed, Row, System, Table
 
@@ -47,7 +47,7 @@ FURTHER = {
 }
 """The same with factors of mass and spin inertia."""
 BOUND = 5e-4
-STEPS = {True: (STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, STEP, 1e-2, 2e-2)}
+STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
 """Steps (s) of the sweep, by ``quick``."""
 FINE_STEP = 5e-4
 """Least of them (s) in the figure."""
@@ -71,7 +71,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         rows += [_further_row(name, *each) for name, each in FURTHER.items()]
     rows += [
         _sweep_row(
-            ("ice", "dry") if quick else tuple(SURFACES),
+            ("ice", "dry") if quick else tuple(NAMED_SURFACES),
             TORQUE_LEVELS[SOME_LEVELS] if quick else TORQUE_LEVELS,
             STEPS[quick],
         ),
@@ -86,16 +86,18 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
     """For twinrig's scheme and the others, over the step: relative error of the stopping distance, and the speed that
     is left where a scheme does not stop."""
     tyre, _ = both = friction_table(name)
-    force, torque = steady_torque(FRONT, tyre, slip)
-    true = exact_distance(FRONT, tyre, torque, speed)
-    ways = {"ours": [(stop(FRONT, both, torque, speed, step).distance, 0.0) for step in steps]}
-    ways |= {key: [stopped(key, FRONT, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
-    steadily = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
+    force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
+    true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
+    ways = {"ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]}
+    ways |= {key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
+    steadily = constant_torque_stop(
+        FRONT_WHEEL, both, torque, speed, turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
+    ).distance
     return {
         "exact": true,
-        "steady": steadily / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
+        "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
         "errors": {key: [(way / true - 1.0, left) for way, left in ends] for key, ends in ways.items()},
-        "at": steps.index(STEP),
+        "at": steps.index(PAPER_STEP),
     }
 
 
@@ -137,10 +139,14 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
 
 
 def _further_row(name: str, surface: str, slip: float, speed: float, mass: float, spin: float) -> Row:
-    quarter = Quarter(mass=mass * FRONT.mass, radius=FRONT.radius, spin_inertia=spin * FRONT.spin_inertia)
+    quarter = Quarter(
+        mass=mass * FRONT_WHEEL.mass, radius=FRONT_WHEEL.radius, spin_inertia=spin * FRONT_WHEEL.spin_inertia
+    )
     tyre, _ = both = friction_table(surface)
     torque = steady_torque(quarter, tyre, slip)[1]
-    error = stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
+    error = (
+        constant_torque_stop(quarter, both, torque, speed).distance / exact_distance(quarter, tyre, torque, speed) - 1.0
+    )
     return Observed(
         f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
@@ -159,9 +165,11 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
         "no number": not all(np.isfinite(part).all() for part in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-        "does not stop": brakes and stopped.rest < 0,
-        "creeps": stopped.rest >= 0
-        and bool(np.abs(speed[stopped.rest :]).max() > 0.0 or np.ptp(path.position[stopped.rest :]) > 0.0),
+        "does not stop": brakes and stopped.step_of_rest < 0,
+        "creeps": stopped.step_of_rest >= 0
+        and bool(
+            np.abs(speed[stopped.step_of_rest :]).max() > 0.0 or np.ptp(path.position[stopped.step_of_rest :]) > 0.0
+        ),
     }
     return [name for name, wrong in broken.items() if wrong]
 
@@ -170,13 +178,17 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
     wrong, runs = list[str](), 0
     for on, step in product(surfaces, steps):
         tyre = friction_table(on)
-        lock = float(tyre[0].mu_x.max()) * FRONT.mass * GRAVITY * FRONT.radius
+        lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
-        for level in levels if on in FULL_SWEEP_SURFACES or step >= STEP else levels[SOME_LEVELS]:
-            faults = faults_of(stop(FRONT, tyre, level * lock, speed, step, WATCHED_SECONDS), FRONT.radius, bool(level))
+        for level in levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else levels[SOME_LEVELS]:
+            faults = faults_of(
+                constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, WATCHED_SECONDS),
+                FRONT_WHEEL.radius,
+                bool(level),
+            )
             wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(faults)}"] if faults else []
             runs += 1
-    some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(FULL_SWEEP_SURFACES)} all)"
+    some = f" (below {1e3 * PAPER_STEP:g} ms every fifth level, but on {', '.join(FULL_SWEEP_SURFACES)} all)"
     some = "" if set(surfaces) <= set(FULL_SWEEP_SURFACES) else some
     what = (
         f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW_SPEED:g}: {len(surfaces)} surfaces, "
@@ -192,16 +204,16 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
 
 def _locked_row() -> Row:
     errors = []
-    for on in SURFACES:
+    for on in NAMED_SURFACES:
         tyre = friction_table(on)
-        torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
-        way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
+        torque = 2.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius * float(tyre[0].mu_x.max())
+        way = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, turning=0.0).distance
         errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
     return Observed(
         "braking_stop.locked",
         SYSTEM,
         "relative difference of the stopping distance with locked wheels from v^2 / (2 mu g) on "
-        f"{len(SURFACES)} surfaces",
+        f"{len(NAMED_SURFACES)} surfaces",
         max(errors),
         "",
     ).at_most(1e-9, "asked for", "closed form")
@@ -209,18 +221,18 @@ def _locked_row() -> Row:
 
 def _release_row() -> Row:
     errors = []
-    for on, step in product(SURFACES, (1e-3, STEP, 2e-2)):
+    for on, step in product(NAMED_SURFACES, (1e-3, PAPER_STEP, 2e-2)):
         tyre, tables = friction_table(on)
-        sliding = FRONT.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT.radius
+        sliding = FRONT_WHEEL.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT_WHEEL.radius
         times = step * np.arange(math.ceil(0.8 / step) + 1)
         braked_stop = braked(
-            FRONT, tables, UNIFORM_ROAD, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0
+            FRONT_WHEEL, tables, UNIFORM_ROAD, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0
         )
-        errors.append(abs(braked_stop.released - 0.5 * 0.8037))
+        errors.append(abs(braked_stop.release_time - 0.5 * 0.8037))
     return Observed(
         "braking_stop.release",
         SYSTEM,
-        f"error of the time at which locked wheels turn again under a falling torque, {len(SURFACES)} "
+        f"error of the time at which locked wheels turn again under a falling torque, {len(NAMED_SURFACES)} "
         "surfaces, steps of 1, 5.5 and 20 ms",
         max(errors),
         "s",
@@ -228,9 +240,9 @@ def _release_row() -> Row:
 
 
 def _friction_row(levels: int) -> Row:
-    torque = 3.0 * FRONT.mass * GRAVITY * FRONT.radius
+    torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
     ways = [
-        stop(FRONT, friction_table("ice", float(scale)), torque, 11.11).distance
+        constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
         for scale in np.geomspace(0.3, 8.0, levels)
     ]
     return Observed(
@@ -259,7 +271,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
-    from models.drawing.figures import COLUMN_WIDTH, GREY, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 5.8), sharex=True, sharey=True)
     milliseconds = 1e3 * np.array(data["steps"])
@@ -271,10 +283,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
             ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
         ax.axhline(100.0 * BOUND, color=GREY, linewidth=0.8)
-        ax.axvline(1e3 * STEP, color=GREY, linewidth=0.8, linestyle=":")
+        ax.axvline(1e3 * PAPER_STEP, color=GREY, linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
         ax.label_outer()
-    heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
+    add_heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
     legend_below(figure, axes.flat[0])
     caption = (
         f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "

@@ -13,9 +13,18 @@ from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH
 from models.systems.braking.march import BrakingPath as Run
 from models.systems.braking.stop_report import Stop
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import TyreTable
-from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady_torques
+from validation.braking.sprung_box import (
+    LOCKING_TORQUE,
+    box,
+    braked_vehicle,
+    car,
+    constant_friction,
+    pitch_and_transfer,
+    remaining_speed,
+    steady_torques,
+)
 from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking on the suspension"
@@ -28,8 +37,8 @@ TURNING, HARDER = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Locked wheels, a J-turn and its mirror image; both engines, the stiff limit and ice in the full share."""
-    wet = surface("wet")
-    turns = [braked(car(), wet, steer=steer).run(steady_torques(*HARDER), 6.0) for steer in (0.1, -0.1)]
+    wet = table_of_surface("wet")
+    turns = [braked_vehicle(car(), wet, steer=steer).run(steady_torques(*HARDER), 6.0) for steer in (0.1, -0.1)]
     rows = [*_locked_rows(GENTLE_FRICTION), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
@@ -43,8 +52,8 @@ def _locked_rows(mu: float) -> list[Row]:
     """Rows of the box and the car with locked wheels, from a speed at which the stop takes 4 s."""
     speed, rows = 4.0 * mu * GRAVITY, []
     for name, vehicle_kind in (("box", box()), ("car", car())):
-        vehicle, place = braked(vehicle_kind, constant(mu)), f"{name}.{mu:g}"
-        path = vehicle.run(steady_torques(*4 * (LOCKS,)), speed)
+        vehicle, place = braked_vehicle(vehicle_kind, constant_friction(mu)), f"{name}.{mu:g}"
+        path = vehicle.run(steady_torques(*4 * (LOCKING_TORQUE,)), speed)
         way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
         gained = float(path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum())
@@ -82,7 +91,7 @@ def _locked_rows(mu: float) -> list[Row]:
                 f"braking_suspension.stays.{place}",
                 SYSTEM,
                 f"speed of the {name} and its rims 2 s after the stop",
-                stays(vehicle, path),
+                remaining_speed(vehicle, path),
                 "m/s",
             ).at_most(1e-3, "what stands has no slip, and friction holds it", "closed form"),
         ]
@@ -121,7 +130,7 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
 def _engine_rows(wet: TyreTable) -> list[Row]:
     """Rows of stops in both engines with steps of 1 ms."""
     ends = [
-        braked(car(), wet, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
+        braked_vehicle(car(), wet, engine, 0.05, 1e-3).run(steady_torques(*HARDER), 15.0).states[-1, 0, :2]
         for engine in ("mujoco", "exudyn")
     ]
     return [
@@ -137,7 +146,7 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
 
 def _order_rows(wet: TyreTable) -> list[Row]:
     ways = [
-        braked(car(), wet, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
+        braked_vehicle(car(), wet, steer=0.05, substeps=n).run(steady_torques(*HARDER), 10.0).states[-1, 0, 0]
         for n in (1, 4, 16)
     ]
     return [
@@ -160,9 +169,9 @@ def _order_rows(wet: TyreTable) -> list[Row]:
 
 def _ice_rows() -> list[Row]:
     """Rows: the slip controller on ice with the suspension, compared with the plane vehicle with load transfer."""
-    ice, speed = surface("ice"), 11.11
+    ice, speed = table_of_surface("ice"), 11.11
     stops = [
-        Stop(braked(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
+        Stop(braked_vehicle(car(), ice, engine, substeps=4, gradient=150.0).run(SlipBangBang(wheels=4), speed))
         for engine in ("mujoco", None)
     ]
     ways = [stop.of_vehicle()["stopping distance [m]"] for stop in stops]
@@ -171,7 +180,7 @@ def _ice_rows() -> list[Row]:
             "braking_suspension.ice.locks",
             SYSTEM,
             "longest time for which a wheel locks above 15 km/h on ice, bang-bang slip controller",
-            float(stops[0].locks().longest.max()),
+            float(stops[0].locks().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(
@@ -200,7 +209,7 @@ class _Timed:
 
 def _speed_row(wet: TyreTable) -> Row:
     """Row on the computing time, from the fastest tenth of the samples, which other processes disturb least."""
-    vehicle, controller = braked(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
+    vehicle, controller = braked_vehicle(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
     return Observed(
@@ -223,7 +232,9 @@ def limit(tyre: TyreTable) -> list[list[float]]:
     for stiffer in (1.0, 10.0, 100.0):
         stiff_box = box(stiffer, 0.01)
         ends = [
-            braked(stiff_box, tyre, engine, 0.015, substeps=4).run(steady_torques(*TURNING), 10.0).states[-1, 0, :2]
+            braked_vehicle(stiff_box, tyre, engine, 0.015, substeps=4)
+            .run(steady_torques(*TURNING), 10.0)
+            .states[-1, 0, :2]
             for engine in ("mujoco", None)
         ]
         distances.append([stiffer, float(np.hypot(*(ends[1] - ends[0])))])

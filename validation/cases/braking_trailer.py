@@ -7,12 +7,12 @@ import numpy as np
 
 from models.brake.controllers.slip import SlipBangBang
 from models.systems.braking.stop_report import Stop
-from models.tyre.magic_formula import surface
+from models.tyre.magic_formula import table_of_surface
 from validation.braking import plain_sprung as whole
 from validation.braking import sprung_train as train
-from validation.braking.sprung_box import braked, constant, steady_torques
-from validation.common.rows import Observed, Row, System, behaves
-from validation.spatial.towing import keep_to_the_car, levers
+from validation.braking.sprung_box import braked_vehicle, constant_friction, steady_torques
+from validation.common.rows import Observed, Row, System, behaviour_row
+from validation.spatial.towing import keep_to_the_car, loads_and_lengths
 
 TITLE = "Braking with a trailer on the suspension"
 SYSTEM: System = "anti-lock"
@@ -42,9 +42,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _levers_row() -> Row:
-    car = whole.towing()
-    path = braked(car, constant(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
-    front, rear, axle, _ = levers(car.handling)
+    car = whole.towing_car()
+    path = braked_vehicle(car, constant_friction(0.1)).run(steady_torques(*6 * (0.0,)), 2.0, 0.05)
+    front, rear, axle, _ = loads_and_lengths(car.handling)
     loads = path.reports.load[-1].reshape(3, 2).sum(axis=1)
     return Observed(
         "braking_trailer.loads",
@@ -60,7 +60,8 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
     return Observed(
         f"braking_trailer.accelerations.{vehicle.replace(' ', '_')}.{engine}",
         SYSTEM,
-        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at {whole.STATES} states of "
+        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
+        f"{whole.STATE_COUNT} states of "
         "any heading",
         whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
@@ -91,7 +92,7 @@ def _locked_row() -> Row:
 
 
 def _alone_rows() -> list[Row]:
-    errors = train.errors()
+    errors = train.caravan_errors()
     told = {
         "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
         "load": "load of the axle of a caravan that brakes alone",
@@ -107,8 +108,8 @@ def _alone_rows() -> list[Row]:
 
 def _control_rows() -> list[Row]:
     """Rows: slip control of all six wheels on ice, compared with locked wheels."""
-    ice, speed = surface("ice"), 11.11
-    vehicle = braked(whole.towing(), ice, substeps=4, gradient=150.0)
+    ice, speed = table_of_surface("ice"), 11.11
+    vehicle = braked_vehicle(whole.towing_car(), ice, substeps=4, gradient=150.0)
     controlled, locked = (
         Stop(vehicle.run(way, speed)) for way in (SlipBangBang(wheels=6), steady_torques(*6 * (1e5,)))
     )
@@ -118,7 +119,7 @@ def _control_rows() -> list[Row]:
             "braking_trailer.ice.locks",
             SYSTEM,
             "longest time for which a wheel of car or caravan locks above 15 km/h on ice, bang-bang slip controller",
-            float(controlled.locks().longest.max()),
+            float(controlled.locks().longest_lock.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(
@@ -133,8 +134,8 @@ def _control_rows() -> list[Row]:
 
 def _fault_rows() -> list[Row]:
     """Rows: faults planted in the force table that both engines share."""
-    held = train.relative_difference(train.pulled(train.hold_on_to_the_car), train.pulled_by_levers())
-    turned = whole.towing.__wrapped__()
+    held = train.relative_difference(train.pulled_caravan(train.hold_on_to_the_car), train.pulled_by_levers())
+    turned = whole.towing_car.__wrapped__()
     keep_to_the_car(turned.handling)
     apart = whole.relative_difference(whole.accelerations(turned, "exudyn", 5), whole.plain_accelerations("caravan", 5))
     seen = {
@@ -142,7 +143,7 @@ def _fault_rows() -> list[Row]:
         "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),
     }
     return [
-        behaves(
+        behaviour_row(
             f"braking_trailer.fault.{name}",
             SYSTEM,
             f"planted: {what}",

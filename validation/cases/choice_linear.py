@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.ride_choice.activity import activity
+from models.advice.ride_choice.activity import activity_by_element
 from models.advice.ride_choice.choose import EQUAL_COST_LOG, Chooser, RideChoice
-from models.advice.ride_choice.screen import Screen, confirmed
+from models.advice.ride_choice.screen import Screen, exact_variances
 from models.core.systems import load
-from models.systems.ride.reduced_scene import Effect, without
+from models.systems.ride.reduced_scene import Effect, reduced_without
 from validation.choice.judged import asked_speeds, changes_by_frequency, measured_step, worst_nearby
 from validation.choice.price_of_choice import whole_car
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.ride.drawn_rides import DrawnRide, drawn
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.ride.drawn_rides import DrawnRide, drawn_ride
 
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
 """The published half car."""
@@ -52,12 +52,12 @@ class Judged:
     @property
     def saving(self) -> float:
         """Ratio of the calls at equal accuracy of the complete scene to those of the reduced scene."""
-        return self.choice.before.calls / self.choice.after.calls
+        return self.choice.cost_before.calls / self.choice.cost_after.calls
 
     @property
     def honest(self) -> bool:
         """False if the choice claims to keep the tolerance and another route finds that it does not."""
-        changes = self.choice.confirmed if self.by_frequency is None else self.by_frequency
+        changes = self.choice.confirmed_change if self.by_frequency is None else self.by_frequency
         return not self.choice.within_tolerance or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
@@ -66,8 +66,8 @@ def judged(scene: DrawnRide, second: bool) -> Judged:
     by frequency responses."""
     chooser = asked_speeds(scene)
     choice, whole = chooser.choose(), chooser.full_scenes[0]
-    rest = whole.reduced(without(scene.scene, choice.left_out))
-    two, deviation = Screen(whole.full, chooser.rows).identity(rest)
+    rest = whole.reduced(reduced_without(scene.scene, choice.left_out))
+    two, deviation = Screen(whole.full, chooser.rows).certificate_sides(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return Judged(
         scene,
@@ -85,7 +85,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     seeds = QUICK_SEEDS if quick else range(SCENES_DRAWN)
     choices = [
-        judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE)
+        judged(
+            drawn_ride(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE
+        )
         for seed in seeds
     ]
     rows = [*_kept_rows(choices), _identity_row(choices), *_equal_rows(choices)]
@@ -102,7 +104,7 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
     share = float(np.mean([each.choice.within_tolerance for each in choices]))
     lies = sum(not each.honest for each in choices)
     second = [each for each in choices if each.by_frequency is not None]
-    gap = max(float(abs(each.by_frequency - each.choice.confirmed).max()) for each in second)
+    gap = max(float(abs(each.by_frequency - each.choice.confirmed_change).max()) for each in second)
     return [
         Observed(
             "choice_linear.kept",
@@ -111,7 +113,7 @@ def _kept_rows(choices: list[Judged]) -> list[Row]:
             share,
             "",
         ).within(1.0, 0.05, "asked: 95 of 100", "none"),
-        behaves(
+        behaviour_row(
             "choice_linear.honest",
             SYSTEM,
             "scenes that are reported as kept although another route shows that they are not",
@@ -135,7 +137,7 @@ def _prediction_row(choices: list[Judged]) -> Row:
     """Row: ratios of predicted to confirmed changes, over all choices and quantities whose change is above zero and
     below 5 %."""
     predicted, confirmed_ = (
-        np.concatenate([getattr(each.choice, part) for each in choices]) for part in PREDICTED_CONFIRMED
+        np.concatenate([getattr(each.choice, f"{part}_change") for each in choices]) for part in PREDICTED_CONFIRMED
     )
     told = (abs(confirmed_) > JUDGED_CHANGES[0]) & (abs(confirmed_) < JUDGED_CHANGES[1])
     ratios = predicted[told] / confirmed_[told]
@@ -202,7 +204,7 @@ def _equal_rows(choices: list[Judged]) -> list[Row]:
             "steps together",
             "closed form",
         ),
-        behaves(
+        behaviour_row(
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
@@ -259,10 +261,10 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
     choice = chooser.choose()
     named = {effect.name: effect for effect in choice.candidates}
     mass, damper = named["mass of all wheels"], named["tyre damping"]
-    alone, both = chooser.confirm(frozenset([mass])), chooser.confirm(frozenset([mass, damper]))
+    alone, both = chooser.confirmed_changes(frozenset([mass])), chooser.confirmed_changes(frozenset([mass, damper]))
     step = chooser.cost(frozenset([mass, damper])).step / chooser.cost(frozenset()).step
     return [
-        behaves(
+        behaviour_row(
             "choice_linear.pair.alone",
             SYSTEM,
             "change of the body acceleration by wheels without mass under damped tyres",
@@ -271,7 +273,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
             "white noise reaches the body",
             "closed form",
         ),
-        behaves(
+        behaviour_row(
             "choice_linear.pair.chosen",
             SYSTEM,
             "both effects are left out at 3 %, each for the other's sake",
@@ -294,12 +296,12 @@ def _activity_rows() -> list[Row]:
     """Rows: the pitch inertia has a large energy activity, yet locking the pitch does not change the bounce of a
     symmetric body."""
     chooser = _paper()
-    watts = activity(chooser.full_scenes[0])
+    watts = activity_by_element(chooser.full_scenes[0])
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     share = finite["inertia body ry"] / sum(finite.values())
     locked = next(effect for effect in chooser.effects if effect.name == "body ry")
-    rest = chooser.full_scenes[0].reduced(without(chooser.scene, [locked]))
-    change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
+    rest = chooser.full_scenes[0].reduced(reduced_without(chooser.scene, [locked]))
+    change = float(np.sqrt(exact_variances(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
         Observed(
             "choice_linear.activity",
@@ -322,8 +324,8 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
     choice = judged_choice.choice
     return {
         "tolerance": judged_choice.scene.tolerance,
-        "predicted": choice.predicted.tolist(),
-        "confirmed": choice.confirmed.tolist(),
+        "predicted": choice.predicted_change.tolist(),
+        "confirmed": choice.confirmed_change.tolist(),
         "saving": judged_choice.saving,
         "kept": choice.within_tolerance,
         "nearby": judged_choice.nearby,
@@ -331,7 +333,7 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
         "said": list(choice.said),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
-        "rounds": choice.rounds,
+        "rounds": choice.confirmations,
     }
 
 
@@ -349,7 +351,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
-    from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
@@ -369,7 +371,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     tolerance, saving = (np.array([each[key] for each in data["scenes"]]) for key in ("tolerance", "saving"))
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
-    heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
+    add_heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
     return [(FIGURE_TEXT, figure)]
 
 

@@ -10,8 +10,8 @@ from models.advice.ride_choice.in_time import FEWEST_COPIES
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import draw_scene
 from validation.choice.judged import JudgedByRuns, judged_of
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.ride.drawn_rides import COPIES, BentRide, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
@@ -67,7 +67,7 @@ def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) ->
     return float(np.quantile(changes, UNSURE))
 
 
-@allowing("random scenes: whether what is left changes them as foretold is judged")
+@allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
@@ -82,7 +82,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
-    kept = float(np.mean([each.choice.within_tolerance and each.honest for each in choices]))
+    kept = float(np.mean([each.choice.within_tolerance and each.is_honest for each in choices]))
     return [
         Observed(
             "choice_nonlinear.kept", SYSTEM, f"share of {len(choices)} random scenes whose tolerance is kept", kept, ""
@@ -91,7 +91,7 @@ def _row_of_kept_tolerances(choices: list[JudgedByRuns]) -> list[Row]:
             "choice_nonlinear.honest",
             SYSTEM,
             "choices that are reported as kept although two more runs show that they are not",
-            float(sum(not each.honest for each in choices)),
+            float(sum(not each.is_honest for each in choices)),
             "",
         ).at_most(0.0, "asked: never", "none"),
     ]
@@ -105,7 +105,7 @@ def _refused() -> Row:
         Chooser(asked.opened(FEWEST_COPIES), ENGINES["ride"][0], list(asked.quantities), FINE_TOLERANCE).choose()
     except InputError as error:
         said = "refused" if "samples would tell" in error.allowed else error.allowed
-    return behaves(
+    return behaviour_row(
         "choice_nonlinear.refused",
         SYSTEM,
         f"choice for a ride of {FEWEST_COPIES} copies at a tolerance of {100 * FINE_TOLERANCE:g} %, where chance may "
@@ -118,7 +118,11 @@ def _refused() -> Row:
 
 def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is significant and below 5 %."""
-    pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
+    pairs = [
+        (p, c)
+        for each in choices
+        for p, c in zip(each.choice.predicted_change, each.choice.confirmed_change, strict=True)
+    ]
     return np.array([pair for pair in pairs if JUDGED_CHANGES[0] < pair[1] < JUDGED_CHANGES[1]]).reshape(-1, 2)
 
 
@@ -175,8 +179,8 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
         "quantities": list(judged_choice.asked.quantities),
         "left out": list(choice.left_out),
         "times": choice.times,
-        "predicted": choice.predicted.tolist(),
-        "confirmed": choice.confirmed.tolist(),
+        "predicted": choice.predicted_change.tolist(),
+        "confirmed": choice.confirmed_change.tolist(),
         "kept": choice.within_tolerance,
         "calls": list(choice.calls),
         "seconds": list(choice.seconds),
@@ -210,7 +214,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Plot predicted over confirmed changes, and savings over the tolerance."""
-    from models.drawing.figures import COLUMN_WIDTH, DARK, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     ends = np.array([1e-4, 6.0])
@@ -241,7 +245,7 @@ def draw(data: Saved) -> Drawn:
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     left.legend(loc="upper left")
     right.legend(loc="best")
-    heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
+    add_heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
     return [(FIGURE_TEXT, figure)]
 
 

@@ -199,7 +199,7 @@ def _mirrored_profiles() -> list[Row]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot both conicities of the standard's profiles with the standard's limits."""
-    from models.drawing.figures import BLUE, VERMILION, heading, legend_below, panels
+    from models.drawing.figures import BLUE, VERMILION, add_heading, legend_below, panels
 
     standard = data["standard"]
     if not standard:
@@ -211,5 +211,5 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.plot(of["amplitude"], of["harmonic"], "--", color=VERMILION, label="first harmonic")
         axis.set(title=name, xlabel="amplitude [mm]", ylabel="equivalent conicity [-]")
     legend_below(figure, axes[0])
-    heading(figure, "Equivalent conicity of the standard's reference profiles")
+    add_heading(figure, "Equivalent conicity of the standard's reference profiles")
     return [("Equivalent conicity over the amplitude, within the limits of EN 15302.", figure)]

@@ -24,7 +24,7 @@ from models.engines.mujoco_quiet import installed
 from models.machine.compiled import njit
 from models.machine.stack import start
 from models.machine.timing import interleave, median, spelled
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.contact import slow_wheels
 
 TITLE = "What a contact kernel costs inside an engine"
@@ -259,7 +259,7 @@ def _threads_row() -> Row:
     with installed(kernel_law(forces)):
         first, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
     same = "identical" if np.isfinite(first).all() and first.tobytes() == two.tobytes() else "different"
-    return behaves(
+    return behaviour_row(
         "contact_bridges.threads",
         SYSTEM,
         "ten runs of 100 steps with FASTSIM in MuJoCo give the same bits in two threads as in one",

@@ -17,7 +17,7 @@ from models.contact.normal_problem import centres
 from models.contact.rolling_operator import FreeSystem, SlipOperator
 from models.contact.rolling_problem import rigid_slip
 from models.core.errors import RunFailed
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
@@ -137,7 +137,7 @@ def _misprint(nodes: Array) -> Row:
     """Row: the comparison detects a widespread misprint of C23."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINT / node[4] - 1.0)
-    return behaves(
+    return behaviour_row(
         "contact_coefficients.misprint",
         SYSTEM,
         f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4 is a misprint that is widespread, off by {off:.1%}",
@@ -219,7 +219,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
@@ -235,7 +235,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for axes in (left, right):
         axes.axvspan(0.1, 10.0, color="0.9", zorder=0, label="range of the table")
     legend_below(figure, left, columns=5)
-    heading(figure, "Kalker's table holds against the exact theory, and so does what leads on beyond it")
+    add_heading(figure, "Kalker's table holds against the exact theory, and so does what leads on beyond it")
     return [
         (
             "Creepage and spin coefficients; outside the grey range asymptotes take the table's place, for C33 of "

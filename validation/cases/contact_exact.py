@@ -359,7 +359,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     x, traction = data["strip"]
@@ -380,7 +380,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
     right.set_title("Rolling forces by their cells")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
-    heading(figure, "The exact theory meets Carter's closed form, and its forces settle as cells are halved")
+    add_heading(figure, "The exact theory meets Carter's closed form, and its forces settle as cells are halved")
     return [
         (
             "Traction of a rolling cylinder beside Carter's closed form, and how much the forces change where cells "

@@ -10,7 +10,7 @@ import numpy as np
 from models.contact.hertz import Hertz, by_approach, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.errors import InputError
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
@@ -162,7 +162,7 @@ def _behaviour() -> list[Row]:
         "friction of steel on aluminium": PAIR.require_likeness,
     }
     rows = [
-        behaves(
+        behaviour_row(
             f"contact_hertz.refused.{name.replace(' ', '_')}",
             SYSTEM,
             f"a contact is refused: {name}",
@@ -173,7 +173,7 @@ def _behaviour() -> list[Row]:
         for name, ask in asked.items()
     ]
     return [
-        behaves(
+        behaviour_row(
             "contact_hertz.nothing",
             SYSTEM,
             "contact forces without load, with a negative load and across a gap",
@@ -213,7 +213,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
@@ -228,5 +228,5 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.axhline(BOUND, color="black", linestyle=":", label="allowed")
     right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))
     right.legend(loc="center", ncols=3)
-    heading(figure, "Hertzian contact loses no digits from a thin line to the circle")
+    add_heading(figure, "Hertzian contact loses no digits from a thin line to the circle")
     return [("Semi-axes of Hertz's ellipse and their error.", figure)]

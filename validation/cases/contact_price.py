@@ -19,8 +19,8 @@ from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
-from validation.contact.contact_bands import FASTSIM, HELD_SHARE, ROUNDING, kept_shares, theory_errors
-from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read_contacts, read_drawn, read_wide
+from validation.contact.contact_bands import FASTSIM_BANDS, HELD_SHARE, ROUNDING, kept_shares, theory_errors
+from validation.contact.contact_set import AXIS_RATIOS, JUDGED_PART, PAIR, POISSON, read_contacts, read_drawn, read_wide
 from validation.contact.programs import compare, table
 
 TITLE = "Stated errors of rolling contact"
@@ -37,7 +37,7 @@ REPEATED = (
 NETS = (7, 11, 21, 41)
 """Cells per strip whose stated errors are judged; a quick run takes 21 alone."""
 JUDGED_CHOICES: tuple[dict[str, str], ...] = ({}, {"bound": "elliptic"}, {"march": "plain"}, {"flexibilities": "one"})
-"""Choices of FASTSIM whose cells are judged, beside the best ones; a quick run takes the first alone."""
+"""Choices of FASTSIM_BANDS whose cells are judged, beside the best ones; a quick run takes the first alone."""
 REFERENCE = {True: 0.01, False: 0.005}
 """By mu N: the exact theory's own error on the grids of a quick and of a full run."""
 MISSED_SHARE = 0.06
@@ -57,9 +57,9 @@ ROWS, SEED = 100_000, 41
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Whether stated errors hold; in the full run also Kalker's two programs and a long table."""
     cases = read_contacts()
-    wide = read_wide(JUDGED)
+    wide = read_wide(JUDGED_PART)
     rows = _reference_rows(cases, quick) + _band_rows(cases, quick) + _total_rows(wide)
-    rows += _moment_rows(cases, read_drawn(JUDGED), wide) + _cell_rows([*cases, *wide], quick)
+    rows += _moment_rows(cases, read_drawn(JUDGED_PART), wide) + _cell_rows([*cases, *wide], quick)
     if quick:
         return rows, {}
     programs = compare(cases[::2])
@@ -87,9 +87,9 @@ def _reference_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
 def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     """Rows: share of contacts whose error exceeds the stated error band. The contacts are those of the calibration set
     and randomly drawn ones."""
-    unseen, rows = read_drawn(JUDGED), []
+    unseen, rows = read_drawn(JUDGED_PART), []
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
-    for name in ["blended intermediate"] if quick else [*FASTSIM, "simplified"]:
+    for name in ["blended intermediate"] if quick else [*FASTSIM_BANDS, "simplified"]:
         drawn = theory_errors(name, unseen)
         for some, place, which, most in (
             (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
@@ -139,9 +139,9 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
 
 
 def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list[ContactCase]) -> list[Row]:
-    """Rows: error of FASTSIM's moment relative to the exact theory."""
+    """Rows: error of FASTSIM_BANDS's moment relative to the exact theory."""
     rows = []
-    range_of_set = [case for case in wide if RATIOS[0] <= case.a / case.b <= RATIOS[-1]]
+    range_of_set = [case for case in wide if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
     sets = {
         "set": (cases, "the set"),
         "drawn": (unseen, "the drawn contacts"),

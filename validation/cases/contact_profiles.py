@@ -243,7 +243,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot position and load of the contact points over the lateral shift."""
-    from models.drawing.figures import heading, subplots
+    from models.drawing.figures import add_heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))
     for name, cases in data.items():
@@ -255,7 +255,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.plot(shift[load > 0], rail[load > 0], label=f"in contact, {LABELS[name]}", **style)
     axis.set(xlabel="lateral shift of the wheelset [mm]", ylabel="place of contact on the rail [mm]")
     axis.legend()
-    heading(figure, "S1002 on UIC 60: where the right wheel touches its rail")
+    add_heading(figure, "S1002 on UIC 60: where the right wheel touches its rail")
     caption = (
         "Right wheel S1002 on UIC 60: the contact jumps to the gauge corner at 5 mm, and the flange touches "
         "from 6.5 mm. Grey: closer than 0.2 mm, but not in contact."

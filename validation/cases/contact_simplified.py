@@ -27,10 +27,10 @@ from validation.contact.contact_shapes import (
     exact_normal,
     exact_placed,
     exact_rolling,
-    formulas,
-    grown,
-    placed,
-    profiles,
+    merged_shapes,
+    placed_wheelsets,
+    profile_shapes,
+    shapes_by_formula,
 )
 
 TITLE = "Rolling contact of any shape: the theory of 1983"
@@ -58,13 +58,13 @@ ABOUT = "the theory has one W for the whole contact: nothing is claimed, the fig
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity; in the full run on all shapes, ways, nets and the time."""
     hertz = {f"{ratio:g}": _hertz(ratio, PLAIN) | {"paper": _hertz(ratio, PAPER)["approach"]} for ratio in HERTZ}
-    jump = largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
+    jump = largest_jump(separate(shapes_by_formula()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
     rows = [*_hertz_rows(hertz), _jump_row(jump)]
     if quick:
         return rows, data
-    data["shapes"] = {shape.name: _against_exact(shape) for shape in formulas() + profiles()}
-    data["grown"] = {shape.name: _approach_of(shape) for shape in grown()} | _errors_on_rails()
+    data["shapes"] = {shape.name: _against_exact(shape) for shape in shapes_by_formula() + profile_shapes()}
+    data["grown"] = {shape.name: _approach_of(shape) for shape in merged_shapes()} | _errors_on_rails()
     data["nets"] = {str(net): _hertz(5.0, replace(PLAIN, net=net)) for net in NETS}
     data["time"] = _times()
     return rows + _shape_rows(data["shapes"]) + _grown_rows(data["grown"]) + _time_rows(data["time"]), data
@@ -139,7 +139,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
     """Relative errors of the approach of wheels on rails, whose patches have each a grid of its own; NaN for one common
     grid."""
     errors = {}
-    for position in placed():
+    for position in placed_wheelsets():
         pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
         along = np.cos(min(part.patch.lean for part in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
@@ -168,7 +168,7 @@ def _times() -> dict[str, list[float]]:
         "roll": lambda: roll(contact, FRICTION, *creepage),
         "press": lambda: press(distance, PAIR, load=1e5),
         "depth": lambda: load_at_depth(patch, 5e-5, PAIR),
-        "exact": lambda: exact_normal(formulas()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
+        "exact": lambda: exact_normal(shapes_by_formula()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
     }
     return dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
 
@@ -372,7 +372,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the errors of the two pressure profiles for each shape."""
     if "shapes" not in data:
         return []
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     shapes = data["shapes"]
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
@@ -395,7 +395,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].set_yticks(place, list(shapes))
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
-    heading(figure, "Theory of 1983 against exact contact: errors with Hertz's and with the paper's pressure")
+    add_heading(figure, "Theory of 1983 against exact contact: errors with Hertz's and with the paper's pressure")
     caption = (
         "Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
         "(elliptic) area and forces are nearer than with the paper's, the peak on ellipses alone."

@@ -14,16 +14,16 @@ import numpy as np
 from models.core.result import Result
 from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
-from models.ensemble.statistics import quantile
+from models.ensemble.statistics import quantile_with_interval
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
-from models.systems.pitch_plane.trust import ANGLE, GrowthCurve, interpolation, model, noise
-from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
+from models.systems.pitch_plane.scene import assembly_of_scene
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, GrowthCurve, interpolation, model_error_curve, noise
+from models.systems.pitch_plane.virtual_measurement import PAPER_FACTORS, perturbed_parameters
 from models.vehicles.pitch_plane import Parameters
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
-from validation.common.scenes import drive, force_scene, on_paper_road
+from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
@@ -72,7 +72,7 @@ COMBINATIONS = (
 
 
 @on_paper_road()
-@allowing("that runs drift off is what is shown", "upright")
+@allowing_breaches("that runs drift off is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per combination; quick: the first one, by few paths."""
     combinations = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
@@ -85,8 +85,8 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
     members = {"noise": _noise, "interpolation": _run_neighbours, "model": _models}[combination.source]
     predicted, measured = members(combination, folder, QUICK_PATHS if quick else PATHS)
     late = [np.inf if time is None else time for time in predicted]
-    median, low, high = quantile(np.array(measured), 0.5)
-    inner = [quantile(np.array(measured), level)[0] for level in (0.25, 0.75)]
+    median, low, high = quantile_with_interval(np.array(measured), 0.5)
+    inner = [quantile_with_interval(np.array(measured), level)[0] for level in (0.25, 0.75)]
     said = (
         combination.source
         + (f" {combination.size:g} N" if combination.size else "")
@@ -96,7 +96,7 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
         "name": combination.name,
         "source": said,
         "rate": combination.rate,
-        "predicted": quantile(np.array(late), 0.5)[0],
+        "predicted": quantile_with_interval(np.array(late), 0.5)[0],
         "median": median,
         "low": low,
         "high": high,
@@ -107,12 +107,12 @@ def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
 
 def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """One predicted drift-off time, and the drift-off time of every noise path."""
-    true = drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
+    true = virtual_drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
     effects = {"force_noise": {"deviation": combination.size, "seed": SEED}}
     scene = force_scene(folder, duration=combination.duration, effects=effects)
-    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], ANGLE), paths)["drift_off"]
-    quiet = assemble(force_scene(folder, duration=combination.duration))
-    return [noise(quiet, combination.size).passes()], times.tolist()
+    times = run_paths(noise_paths(scene, np.array([]), true["pitch"], UNTRUSTED_PITCH), paths)["drift_off"]
+    quiet = assembly_of_scene(force_scene(folder, duration=combination.duration))
+    return [noise(quiet, combination.size).passing_time()], times.tolist()
 
 
 def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
@@ -124,33 +124,35 @@ def _run_neighbours(combination: Combination, folder: Path, paths: int) -> tuple
     ]
     predicted, measured = [], []
     for road in roads:
-        true = drive(folder, combination.duration, 1 / combination.rate, STEP, road=road)
-        assembly = assemble(
+        true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=road)
+        assembly = assembly_of_scene(
             force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
         )
-        predicted.append(interpolation(assembly).passes())
+        predicted.append(interpolation(assembly).passing_time())
         measured.append(_drift_off(assembly, true))
     return predicted, measured
 
 
 def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Predicted and measured drift-off times of vehicles with random parameters, all started from the true state."""
-    true = drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
-    assembly = assemble(force_scene(folder, step=STEP, duration=combination.duration))
+    true = virtual_drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
+    assembly = assembly_of_scene(force_scene(folder, step=STEP, duration=combination.duration))
     p, others = assembly.parameters, list[Parameters]()
     for i in range(MODELS):
-        factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER))
-        others.append(p.model_copy(update=perturbed(p, dict(zip(PAPER, factors, strict=True)))))
+        factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
+        others.append(p.model_copy(update=perturbed_parameters(p, dict(zip(PAPER_FACTORS, factors, strict=True)))))
     return (
-        [model(assembly, other).passes() for other in others],
+        [model_error_curve(assembly, other).passing_time() for other in others],
         [_drift_off(replace(assembly, parameters=other), true) for other in others],
     )
 
 
 def _drift_off(assembly: Assembly, true: Result) -> float:
-    """First time (s) at which the run's pitch differs from the true pitch by ANGLE; infinite if it never does."""
+    """First time (s) at which the run's pitch differs from the true pitch by UNTRUSTED_PITCH; infinite if it never
+    does.
+    """
     run = simulate(assembly.scene, "reference", assembly=assembly)
-    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
+    time = GrowthCurve(run.times, np.abs(run["pitch"] - true["pitch"])).passing_time()
     return np.inf if time is None else time
 
 
@@ -197,13 +199,15 @@ def tables(data: Saved) -> list[Table]:
         "runs",
         "median / prediction",
     )
-    note = f"Drift-off: pitch {ANGLE} rad from the true one. The prediction of an ensemble is its median, too."
+    note = (
+        f"Drift-off: pitch {UNTRUSTED_PITCH} rad from the true one. The prediction of an ensemble is its median, too."
+    )
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
 def draw(data: Saved) -> Drawn:
     """Plot measured over predicted drift-off times."""
-    from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, subplots
+    from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, add_heading, subplots
 
     figure, axis = subplots(figsize=(5.2, 4.2))
     ends = [each["predicted"] for each in data["combinations"]]
@@ -219,6 +223,6 @@ def draw(data: Saved) -> Drawn:
             axis.errorbar(predicted, middle, spread, fmt="o", color=colour, label=source, markersize=4, elinewidth=0.8)
     axis.set(xlabel="predicted before the run [s]", ylabel="measured: median and quartiles [s]")
     axis.legend(loc="upper left")
-    heading(figure, "Drift-off is known before the run")
+    add_heading(figure, "Drift-off is known before the run")
     caption = "Time at which the pitch is 0.05 rad off, over roads, speeds, sampling rates and sources of error."
     return [(caption, figure)]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.drift.growth import pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
@@ -19,11 +19,11 @@ from models.drift.score import section_forces
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.trust import GrowthCurve
 from models.vehicles.pitch_plane_equations import suspension_loads
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
-from validation.common.scenes import drive, force_scene, on_paper_road
+from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
@@ -88,7 +88,7 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
     fixed steps.
     """
-    true = drive(folder, DURATION, 1 / RATE, 2.5e-4)
+    true = virtual_drive(folder, DURATION, 1 / RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
@@ -100,7 +100,7 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     )
     for name, rule, effects, chosen in inputs:
         scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
-        assembly = assemble(scene)
+        assembly = assembly_of_scene(scene)
         for engine, method, value in chosen:
             solver = {"engine": engine, "method": method, "value": value, "input": name}
             drifted.append(solver | _drift(assembly, engine, method, value, true))
@@ -114,15 +114,15 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
-    time = GrowthCurve(run.times, error).passes()
+    time = GrowthCurve(run.times, error).passing_time()
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
 def _smoothing(folder: Path) -> list[Saved]:
     """For each smoothing filter and integration scheme, on the same noise files: growth of the pitch's spread, and
     damage of the section forces."""
-    true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
-    quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
+    true = virtual_drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
+    quiet = assembly_of_scene(force_scene(folder, step=1e-3, duration=NOISY))
     treatments = [
         _record_of_solver(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
         for cutoff in CUTOFFS
@@ -143,7 +143,7 @@ def _record_of_solver(
     rows = np.rint(np.array(WINDOW) / step).astype(int)
     spread = np.zeros(2)
     for path in range(PATHS):
-        noise = NOISE * normal(SEED, path, len(forces.values), 2)
+        noise = NOISE * normal_samples(SEED, path, len(forces.values), 2)
         spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
     growth, expected = (float(np.log(each[1] / each[0]) / np.diff(WINDOW)[0]) for each in (spread, law))
@@ -188,7 +188,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     p, period = assembly.parameters, 1 / NOISY_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
     at = np.rint(np.array(WINDOW) / period).astype(int)
-    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
+    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.engines.protocol import build, guard
 from models.machine.timing import describe, interleave, paired_ratio
-from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.run import output_channels
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.hand_built import exudyn_run, mujoco_run
@@ -19,7 +19,7 @@ from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
 from validation.choice.price_of_choice import price_of_choice
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
 
 TITLE = "What the machinery costs, and each effect"
@@ -44,7 +44,7 @@ TIMED_STEPS = 500
 """Steps of the runs whose seconds tell what an effect adds."""
 
 
-@allowing("what is computed is what is counted, whatever the vehicle does meanwhile")
+@allowing_breaches("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 4 s, a tenth of
     the rounds, and each effect in one of the three engines, in turn.
@@ -67,7 +67,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def hand_built(engine: str, bare: Scene) -> Any:
     """The hand-built model of the bare vehicle in an engine."""
-    assembly, settings = assemble(bare), settings_of(bare, engine)
+    assembly, settings = assembly_of_scene(bare), settings_of(bare, engine)
     run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
@@ -279,9 +279,9 @@ def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
 
 def _job(bare: Scene, engine: str) -> Any:
     """A run of a scene, channels included, whose model is built already."""
-    assembly = assemble(bare)
+    assembly = assembly_of_scene(bare)
     built = build(engine, assembly, settings_of(bare, engine))
-    return lambda: outputs(assembly, built.run(), built)
+    return lambda: output_channels(assembly, built.run(), built)
 
 
 def tables(data: Saved) -> list[Table]:

@@ -11,13 +11,13 @@ from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble, parameter_set
-from models.systems.pitch_plane.virtual_measurement import perturbed, write_wheel_forces
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, parameter_set
+from models.systems.pitch_plane.virtual_measurement import perturbed_parameters, write_wheel_forces
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import equilibrium
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
-from validation.common.scenes import VEHICLES, drive, force_scene, on_paper_road
+from validation.common.scenes import VEHICLE_SETS, force_scene, on_paper_road, virtual_drive
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
@@ -74,12 +74,12 @@ def relative(computed: np.ndarray, true: np.ndarray) -> float:
 
 
 @on_paper_road()
-@allowing("the moment is compared, and its size is another matter", "little artificial")
+@allowing_breaches("the moment is compared, and its size is another matter", "little artificial")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, no road."""
     with TemporaryDirectory() as name:
         work = Path(name)
-        rows = _manoeuvre(work, VEHICLES[-1:] if quick else VEHICLES, QUICK_DURATION if quick else DURATION)
+        rows = _manoeuvre(work, VEHICLE_SETS[-1:] if quick else VEHICLE_SETS, QUICK_DURATION if quick else DURATION)
         ringing, paths = _ringing(work)
         rough, table = ([], []) if quick else _study_road(work, (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     return rows + ringing + rough, {"table": table, "ringing": paths}
@@ -166,7 +166,7 @@ def _ringing(folder: Path) -> CaseAnswer:
 
 def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
     """Exudyn's multiplier (n,) when its initial accelerations are not made consistent with the constraint."""
-    model: Any = build("exudyn", assemble(scene), settings)
+    model: Any = build("exudyn", assembly_of_scene(scene), settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
     moment = model.run().moment
@@ -177,8 +177,8 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """Rows and table on the paper's guided run on the study road: error of the enforced moment at each step, divided by
     the rms of the moment."""
-    drive(folder, ROUGH_FACTOR + 0.1, PERIOD, PERIOD)
-    paper = perturbed(PARAMETERS)
+    virtual_drive(folder, ROUGH_FACTOR + 0.1, PERIOD, PERIOD)
+    paper = perturbed_parameters(PARAMETERS)
     scene = force_scene(
         folder, step=PERIOD, duration=ROUGH_FACTOR, interpolation="smooth", override=paper, effects=GUIDE
     )
@@ -221,7 +221,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Plot how the multiplier rings after an abrupt start."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))
     paths = data["ringing"]
@@ -229,7 +229,7 @@ def draw(data: Saved) -> Drawn:
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)
         axis.plot(1e3 * np.array(paths["time"]), path, style, label=name, color=f"C{i // 2}", linewidth=width)
     axis.set(xlabel="time [ms]", ylabel="error of the moment [N m]")
-    heading(figure, "Exudyn's enforced moment rings after an abrupt start, and not after a consistent one")
+    add_heading(figure, "Exudyn's enforced moment rings after an abrupt start, and not after a consistent one")
     axis.legend()
     caption = (
         "A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out with the "

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.statistics import deviation, percentiles, quantile
+from models.ensemble.statistics import deviation_with_error, percentiles, quantile_with_interval
 from models.ensemble.store import Arrays
-from models.ensemble.workers import processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
+from models.ensemble.workers import process_pool
+from models.systems.pitch_plane.noise_paths import NoisePaths, largest_difference, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from validation.common.peak_memory import peak_memory
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
-from validation.common.scenes import drive, force_scene
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
+from validation.common.scenes import force_scene, virtual_drive
 
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
@@ -44,7 +44,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LARGE_ENSEMBLE_SECONDS
-        measured = drive(forces, duration, STEP, STEP)
+        measured = virtual_drive(forces, duration, STEP, STEP)
         truth = measured["pitch"]
         scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
@@ -53,7 +53,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         large = _in_own_process(_large_ensemble, job, LARGE_ENSEMBLE_PATHS, forces / "large")
         paths = large.pop("found")
         rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
-        with processes(2) as pool:
+        with process_pool(2) as pool:
             again, half = pool.submit(run_paths, job, RECOMPUTED_PATHS), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, paths, forces / "killed")
             rows += [
@@ -108,7 +108,7 @@ def _same_row(id: str, title: str, first: Arrays, other_paths: Arrays) -> Row:
     """Row: two ensembles are equal to the last bit."""
     count = len(other_paths["drift_off"])
     equal = all(np.array_equal(first[name][:count], other_paths[name], equal_nan=True) for name in first)
-    return behaves(
+    return behaviour_row(
         f"ensemble.{id}",
         SYSTEM,
         title,
@@ -165,7 +165,7 @@ def _run_slow_job(job: NoisePaths, blocks: Path) -> None:
 
 def _in_own_process(function: Callable[..., Any], *args: Any) -> Any:
     """Value of a function that is run in a process of its own, so that its memory can be measured alone."""
-    with processes(1) as pool:
+    with process_pool(1) as pool:
         return pool.submit(function, *args).result()
 
 
@@ -174,7 +174,7 @@ def _large_ensemble(job: NoisePaths, many: int, blocks: Path) -> Saved:
     import resource
 
     start = time.perf_counter()
-    with processes(2) as pool:
+    with process_pool(2) as pool:
         paths = run_paths(job, many, blocks, pool)
     seconds = time.perf_counter() - start
     parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -272,9 +272,9 @@ def _engines(
             f"largest difference of {count} paths in {way} from the reference before drift-off, over the largest state"
         )
         rows.append(
-            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(ensemble, paths, times), "").at_most(
-                1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native"
-            )
+            Observed(
+                f"ensemble.engines.{_slug(way)}", SYSTEM, what, largest_difference(ensemble, paths, times), ""
+            ).at_most(1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native")
         )
     return rows, prices
 
@@ -315,8 +315,11 @@ def _half_step_row(forces: Path) -> Row:
 def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
     """Saved numbers for the tables and the figure."""
     errors = paths["states"] - truth[:: round(1.0 / STEP)]
-    spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
-    quantiles = [[level, *quantile(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
+    spreads = [
+        [when, *deviation_with_error(errors[:, round(when), 3]), *deviation_with_error(errors[:, round(when), 2])]
+        for when in TIMES
+    ]
+    quantiles = [[level, *quantile_with_interval(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
     counts, edges = np.histogram(paths["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
     fan = percentiles(errors[:, 1:, 3])
     return {
@@ -379,7 +382,7 @@ def draw(data: Saved) -> Drawn:
     if not data:
         return []
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import BLUE, COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import BLUE, COLUMN_WIDTH, add_heading, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
@@ -388,7 +391,7 @@ def draw(data: Saved) -> Drawn:
     histogram.set_title("Drift-offs: paths per half second [-]")
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")
-    heading(figure, f"One measured run, {LARGE_ENSEMBLE_PATHS:,} samples of its noise: how far its pitch is off")
+    add_heading(figure, f"One measured run, {LARGE_ENSEMBLE_PATHS:,} samples of its noise: how far its pitch is off")
     return [
         (
             f"{LARGE_ENSEMBLE_PATHS:,} noise paths in the reference: how the pitch error spreads, and when paths "

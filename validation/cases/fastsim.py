@@ -16,9 +16,9 @@ from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import MaterialPair
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import theory_errors
-from validation.contact.contact_set import JUDGED, read_contacts, read_drawn
+from validation.contact.contact_set import JUDGED_PART, read_contacts, read_drawn
 from validation.contact.fastsim_speed import speed
-from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst_violation
+from validation.contact.fuzzed_creepage import COMPUTED_OPTIONS, SUM_ROUNDING, random_contacts, worst_violation
 
 TITLE = "FASTSIM"
 SYSTEM: System = "contact"
@@ -146,8 +146,8 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
-        options = OPTIONS[i % len(OPTIONS)]
-        for name, value in worst_violation(contacts(SEED, first + i, count), options, PAIR).items():
+        options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
+        for name, value in worst_violation(random_contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
     what = {
@@ -172,7 +172,7 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
             f"{what[name]}, worst of {total:,} random contacts",
             value,
             "mu N",
-        ).at_most(*ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")), "none")
+        ).at_most(*ALLOWED.get(name, (SUM_ROUNDING, "rounding of some hundred sums")), "none")
         for name, value in answers.items()
     ]
 
@@ -212,7 +212,7 @@ def _limits() -> list[Row]:
         ).at_most(0.3, "one flexibility in full sliding makes it rounding; 0.3 asked for", "closed form"),
         Observed(
             "fastsim.sliding.size", SYSTEM, "difference of the force in full sliding from mu N", float(short), "mu N"
-        ).at_most(ROUNDING, "pressures of the cells sum up to the load", "closed form"),
+        ).at_most(SUM_ROUNDING, "pressures of the cells sum up to the load", "closed form"),
     ]
 
 
@@ -282,7 +282,7 @@ def _with_changed_column(columns: Contacts, name: str, step: float) -> Array:
 
 def _errors_on_random_contacts() -> list[Row]:
     """Rows: error of the model on random contacts that were not used to calibrate it."""
-    error = theory_errors("blended intermediate", read_drawn(JUDGED)).error
+    error = theory_errors("blended intermediate", read_drawn(JUDGED_PART)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
     return [
         Observed(
@@ -353,7 +353,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the largest error over the number of cells."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))
     for i, (name, values) in enumerate(data["cells"].items()):
@@ -370,5 +370,5 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axis.set(xlabel="cells per strip [-]", ylabel="largest error of the force [% of μN]")
     axis.set_yticks([0.01, 0.1, 0.4, 1, 10], ["0.01", "0.1", "0.4", "1", "10"])
     legend_below(figure, axis)
-    heading(figure, "FASTSIM: the second-order march needs a tenth of the cells")
+    add_heading(figure, "FASTSIM: the second-order march needs a tenth of the cells")
     return [("Largest error of FASTSIM's force over its cells, three bounds and both marches.", figure)]

@@ -12,7 +12,7 @@ import numpy as np
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.drift.growth import (
-    CUTOFF,
+    FAST_PITCH_FREQUENCY,
     growth_rate,
     heave_variance,
     pitch_rate_of_forces,
@@ -24,14 +24,14 @@ from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble, changed
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
-from models.systems.pitch_plane.tangent import covariance, measured_growth, path_of, swing
-from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement
+from models.systems.pitch_plane.tangent import covariance, measured_growth, path_of, slow_swing_frequency
+from models.systems.pitch_plane.virtual_measurement import perturbed_parameters, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
-from validation.common.scenes import drive, force_scene, on_paper_road, road_scene
+from validation.common.scenes import force_scene, on_paper_road, road_scene, virtual_drive
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
@@ -56,7 +56,7 @@ LAW = "the averaged law holds to its next order in growth rate over frequency; 3
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
-    true = drive(folder, LENGTH)
+    true = virtual_drive(folder, LENGTH)
     spread = _spread(true, folder, quick)
     if quick:
         roads = {STUDY: _growth(folder, ROADS[STUDY], 2)}
@@ -75,10 +75,10 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
 def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     """Standard deviations of pitch and heave at 1 to 10 s by three routes: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
-    times, assembly = np.arange(1, LENGTH + 1), assemble(_noisy(folder, LENGTH))
+    times, assembly = np.arange(1, LENGTH + 1), assembly_of_scene(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
-    p, quiet = assembly.parameters, assemble(force_scene(folder, duration=LENGTH))
-    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    p, quiet = assembly.parameters, assembly_of_scene(force_scene(folder, duration=LENGTH))
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
     carried = covariance(quiet, DEVIATION)
     alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
@@ -95,7 +95,7 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     }
     if not quick:
         job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
-        off = run_paths(job, PATHS)["states"] - path_of(quiet).carry(np.zeros((1, 8)))[0][at]
+        off = run_paths(job, PATHS)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}
 
@@ -114,8 +114,8 @@ def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> Er
 def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Saved:
     """Growth rates of the error on one road, by four routes: from the run, from its forces, with other cut-offs, and
     measured in time windows with forces in both frames."""
-    true = drive(folder, WINDOW * windows, parameters=parameters, road=road)
-    assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
+    true = virtual_drive(folder, WINDOW * windows, parameters=parameters, road=road)
+    assembly = assembly_of_scene(force_scene(folder, parameters, 1e-3, WINDOW * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
     alone = pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
     starts = np.rint(np.arange(windows) * WINDOW * RATE).astype(int)
@@ -128,14 +128,14 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str =
     return {
         "run": growth_rate(rate, 1 / RATE, p),
         "forces": growth_rate(alone, 1 / RATE, p),
-        "cut-offs": [growth_rate(rate, 1 / RATE, p, CUTOFF * factor) for factor in (0.5, 2.0)],
+        "cut-offs": [growth_rate(rate, 1 / RATE, p, FAST_PITCH_FREQUENCY * factor) for factor in (0.5, 2.0)],
         "measured": float(measured["force"][0].mean()),
         "scatter": float(measured["force"][0].std(ddof=1)),
         "body": float(measured["force-body"][0].mean()),
         "body error": float(measured["force-body"][1].max()),
-        "swing": float(np.mean([swing(path) for path in paths["force-body"]])),
+        "swing": float(np.mean([slow_swing_frequency(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
-        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
+        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.wheel_inertia / rigid.inertia)),
     }
 
 
@@ -226,7 +226,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
         Observed(
             "growth.cut-off",
             SYSTEM,
-            f"largest change of the growth rate if the cut-off of {CUTOFF} Hz is halved or doubled",
+            f"largest change of the growth rate if the cut-off of {FAST_PITCH_FREQUENCY} Hz is halved or doubled",
             worst,
             "",
         ).at_most(0.05, "the choice must not matter", "none"),
@@ -250,10 +250,10 @@ def _body_row(key: str, title: str, road: Saved) -> Row:
 
 def _twin_row(folder: Path) -> Row:
     """Row: the law of growth for a vehicle with unequal ends, whose lever arms count from the common centre of mass."""
-    true = drive(folder, 5.0, parameters="asymmetric_twin")
-    assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
+    true = virtual_drive(folder, 5.0, parameters="asymmetric_twin")
+    assembly = assembly_of_scene(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
-    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(pitch_variance(5.0, sinh_law_rate(true["pitch_rate"], 1 / RATE, p)[at], q)))
     deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = (
@@ -266,7 +266,7 @@ def _twin_row(folder: Path) -> Row:
 def _engine_rows(folder: Path) -> list[Row]:
     """Rows: largest difference between the engines' paths under one noise file, until the pitch error reaches 0.05
     rad."""
-    true = drive(folder, LENGTH)
+    true = virtual_drive(folder, LENGTH)
     runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
     base = runs["reference"]
     off = np.abs(base["pitch"] - true["pitch"]) > 0.05
@@ -304,11 +304,11 @@ def _step_row(folder: Path) -> Row:
 def _linear_row(folder: Path) -> Row:
     """Row: if vehicle and measurement are linearised, even the perturbed vehicle does not drift off."""
     linear = {"geometry": "linear"}
-    true = simulate(changed(road_scene(duration=60.0), vehicle=linear), "reference")
+    true = simulate(changed_scene(road_scene(duration=60.0), vehicle=linear), "reference")
     write_measurement(true, folder, 1 / RATE)
     start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
-    wrong = force_scene(folder, duration=60.0, override=perturbed(PARAMETERS))
-    run = simulate(changed(wrong, vehicle=linear, start=start), "reference")
+    wrong = force_scene(folder, duration=60.0, override=perturbed_parameters(PARAMETERS))
+    run = simulate(changed_scene(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
     what = "largest pitch error of the perturbed model, linearised, in 60 s"
     why = "drift needs the cosine: with it this run drifts off after 12 s"
@@ -344,7 +344,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
-    from models.drawing.figures import heading, subplots
+    from models.drawing.figures import add_heading, subplots
 
     spread = data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
@@ -359,6 +359,6 @@ def draw(data: Saved) -> Drawn:
             axis.loglog(spread["time"], spread[name], style, label=label, markersize=4)
     axis.set(xlabel="time [s]", ylabel="standard deviation of the pitch [rad]")
     axis.legend()
-    heading(figure, "A pitch error under force noise grows faster than noise alone would have it")
+    add_heading(figure, "A pitch error under force noise grows faster than noise alone would have it")
     caption = "Spread of the pitch under white noise on the wheel forces: growth makes it four times wider by 10 s."
     return [(caption, figure)]

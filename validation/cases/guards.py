@@ -12,7 +12,7 @@ from models.core.errors import InputError, RunFailed
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, MISSING
 from validation.common import full_disk, wrong_engines
-from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
@@ -102,10 +102,12 @@ def constrained(engine: str) -> dict[str, str]:
 def constrained_unchecked() -> dict[str, str]:
     """How runs with a prescribed pitch end in Exudyn's explicit integrators if the check before the run is bypassed.
     The guard after the run compares the multiplier with the balance of moments."""
-    names = [name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED.values()]
+    names = [
+        name for name in integrators("exudyn", adaptive=False) if name not in setups.CONSTRAINED_INTEGRATORS.values()
+    ]
     explicit = [name for name in names if name != "TrapezoidalIndex2"]
     scene = prescribed_pitch.scene()
-    return {name: ending(partial(setups.unchecked, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
+    return {name: ending(partial(setups.unchecked_run, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
 def _unexpected_endings(endings: dict[str, str], expected: str) -> str:
@@ -124,7 +126,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     for name, endings_of in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
-            behaves(
+            behaviour_row(
                 f"guards.constraint.exudyn.{name}",
                 SYSTEM,
                 f"an integrator that ignores the active constraint, Exudyn, all {len(endings_of)}{how}",
@@ -139,7 +141,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _outside_rows() -> list[Row]:
     """Rows: the guards report wrong integrators of outside engines in every run, and pass a right one."""
-    silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
+    silent, right = wrong_engines.integrators_that_pass(), wrong_engines.integrators_that_pass((wrong_engines.Right,))
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG_ENGINES)
     return [
         Observed(
@@ -149,7 +151,7 @@ def _outside_rows() -> list[Row]:
             len(silent),
             "",
         ).at_most(0.0, "every such run is held against the reference", "native"),
-        behaves(
+        behaviour_row(
             "guards.outside.right",
             SYSTEM,
             "a right integrator from outside the project passes the same comparison",
@@ -165,8 +167,9 @@ def _disk_row(folder: Path) -> Row:
     return Observed(
         "guards.full_disk",
         SYSTEM,
-        f"number of moments (of {full_disk.MOMENTS}) at which a full disk leaves an incomplete file or is not reported",
-        full_disk.damage(folder),
+        f"number of moments (of {full_disk.MOMENTS_TRIED}) at which a full disk leaves an incomplete "
+        "file or is not reported",
+        full_disk.damaged_moments(folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")
 
@@ -175,7 +178,7 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
     """Rows: no run at an unstable step gives a silent wrong answer; if the check before it is bypassed, the guard after
     it raises an error."""
     checked = unstable(engine, setups.run, quick)
-    past = unstable(engine, setups.unchecked, quick)
+    past = unstable(engine, setups.unchecked_run, quick)
     endings[engine] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
@@ -186,11 +189,11 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
             checked["SILENT"],
             "runs",
         ).at_most(0.0, "a step beyond the stability limit is refused with the limit named", "native"),
-        behaves(
+        behaviour_row(
             f"guards.unstable.{engine}.unchecked",
             SYSTEM,
             f"RK4 at 5 ms over 2 s with the step check bypassed, {engine}",
-            ending(lambda: setups.unchecked(engine, road(), 5e-3, 2.0)),
+            ending(lambda: setups.unchecked_run(engine, road(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
         ),
@@ -203,7 +206,7 @@ def _input_rows(engine: str) -> list[Row]:
     with TemporaryDirectory() as place:
         file = ending(lambda: sampled_input.damaged(engine, Path(place)))
     return [
-        behaves(
+        behaviour_row(
             f"guards.nan-file.{engine}",
             SYSTEM,
             f"a force file that holds NaN, {engine}",
@@ -211,7 +214,7 @@ def _input_rows(engine: str) -> list[Row]:
             "refused",
             "the reader names the line",
         ),
-        behaves(
+        behaviour_row(
             f"guards.nan.{engine}",
             SYSTEM,
             f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine}",
@@ -219,7 +222,7 @@ def _input_rows(engine: str) -> list[Row]:
             "caught",
             "Exudyn's explicit solvers return True with NaN",
         ),
-        behaves(
+        behaviour_row(
             f"guards.step-sampling.{engine}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine}",
@@ -227,7 +230,7 @@ def _input_rows(engine: str) -> list[Row]:
             "refused",
             "a held sample would change in a step",
         ),
-        behaves(
+        behaviour_row(
             f"guards.step-duration.{engine}",
             SYSTEM,
             f"a step that does not divide the duration, {engine}",

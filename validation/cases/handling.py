@@ -17,15 +17,15 @@ from models.machine.timing import interleave, median
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.energy import energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted
 from models.systems.handling.run import Drive, drive_run, driven_by
 from models.systems.handling.single_track import steady_turn
-from models.tyre.bristles import FIRST_FLEXIBILITY, brush, net, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
+from validation.braking.load_transfer import braked_error, sliding_car, turning_car, turning_error
 from validation.braking.sprung_box import box
-from validation.common.rows import Observed, Row, System, behaves
-from validation.spatial.cars import cornering_error, mirrored
+from validation.common.rows import Observed, Row, System, behaviour_row
+from validation.spatial.cars import cornering_error, mirrored_coordinates
 
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
@@ -83,7 +83,7 @@ def locked_error() -> float:
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
     slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()
-    forces = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
+    forces = brush_forces(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
     return float(np.abs(forces / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
 
 
@@ -107,7 +107,7 @@ def _tyre_rows() -> list[Row]:
 
 
 def _power_row(drive: Drive) -> Row:
-    return behaves(
+    return behaviour_row(
         "handling.power",
         SYSTEM,
         "power of each tyre's contact at every step of the lane change",
@@ -125,7 +125,7 @@ def mirror_gap(handling: Handling, duration: float) -> float:
         )
         for side in (1.0, -1.0)
     )
-    return float(np.abs(left.run.positions - mirrored(handling, right.run.positions)).max())
+    return float(np.abs(left.run.positions - mirrored_coordinates(handling, right.run.positions)).max())
 
 
 def _mirror_row(duration: float) -> Row:
@@ -195,8 +195,8 @@ def _transfer_rows() -> list[Row]:
     """Rows: load transfer of the car, and of a box on four springs, compared with the balance of all bodies."""
     rows = []
     for name, vehicle in (("car", NO_DRAG), ("box", box().handling.given)):
-        braking = braked_error(drive_run("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
-        turn = turning_error(drive_run("mujoco", turning(vehicle, 2e-3), SPEED, 3.0))
+        braking = braked_error(drive_run("mujoco", sliding_car(vehicle, GENTLE), 10.0, 2.0), GENTLE)
+        turn = turning_error(drive_run("mujoco", turning_car(vehicle, 2e-3), SPEED, 3.0))
         rows += [
             Observed(
                 f"handling.transfer.{name}",
@@ -235,7 +235,7 @@ def _energy_rows() -> list[Row]:
                 "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
             )
             gaps[name, step] = float(np.abs(unaccounted(drive)).max())
-    whole = energy(drive)[0]
+    whole = drive_energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [
         Observed(
@@ -250,7 +250,7 @@ def _energy_rows() -> list[Row]:
             "Simpson's rule; bristles that begin to slide limit its order",
             "closed form",
         ),
-        behaves(
+        behaviour_row(
             "handling.ledger_order",
             SYSTEM,
             "its order in the step where friction holds the bristles and no wheel lifts",
@@ -288,7 +288,7 @@ def _fault_rows() -> list[Row]:
         > 1e-10,
     }
     return [
-        behaves(
+        behaviour_row(
             f"handling.fault{i}",
             SYSTEM,
             f"planted: {name}",
@@ -325,7 +325,7 @@ def _threads_row() -> Row:
     with installed(built.law):
         serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
-    return behaves(
+    return behaviour_row(
         "handling.threads",
         SYSTEM,
         "three lane changes computed by MuJoCo in two threads and in one: equal to the last bit",

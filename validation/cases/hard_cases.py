@@ -9,11 +9,11 @@ from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.hard_cases import cases_by_family
 from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, CaseOutcome, judge
-from validation.hard_cases.catalogue import COVERED, beyond
+from validation.hard_cases.catalogue import COVERED_CLASSES, cases_beyond_catalogue
 
 TITLE = "Hard cases"
 SYSTEM: System = "hard-cases"
@@ -23,7 +23,7 @@ FILES = ("measured_files",)
 QUICK_SPACING = 24
 
 
-@allowing("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
+@allowing_breaches("hard cases go beyond what is taken for granted: that they stay stable, or say so, is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
@@ -77,7 +77,7 @@ def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     if case.wanted(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
         return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.why, judged)
-    return behaves(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
+    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 
 def tables(data: Saved) -> list[Table]:
@@ -91,9 +91,9 @@ def _catalogue(data: Saved) -> Table:
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
     rows = tuple(
         (str(number), what, "; ".join(f"{name} ({', '.join(words.get(name, ['missing']))})" for name in names))
-        for number, (what, names) in COVERED.items()
+        for number, (what, names) in COVERED_CLASSES.items()
     )
-    more = len(beyond(list(words)))
+    more = len(cases_beyond_catalogue(list(words)))
     return Table(
         "The catalogue of hard cases",
         f"Classes of failures known from practice and literature, with the "

@@ -14,18 +14,18 @@ from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.comparison import FILTER, Comparison, compare
-from models.systems.hub_forces.measurement import HubForces, model, recorded, true_run, two_tracks
+from models.systems.hub_forces.comparison import FILTERED_RUN, Comparison, compare
+from models.systems.hub_forces.measurement import HubForces, hub_model, recorded_measurement, true_run, two_tracks
 from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
 from models.vehicles.spatial import SpringDamper
-from validation.common.grounds import allowing
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.spatial import hub_inputs
-from validation.spatial.cars import anywhere, by_jacobians, r19, shaken, static, twin
+from validation.spatial.cars import by_jacobians, r19, random_states, random_wrenches, static_forces, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
@@ -36,7 +36,7 @@ TILT = 0.1
 STEP = 1e-3
 
 
-@allowing("runs that nothing holds drift off, which is what is shown")
+@allowing_breaches("runs that nothing holds drift off, which is what is shown")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Engines and closed forms; in full also measurement, growth, stabilisers, the twin and planted faults."""
     car = r19()
@@ -63,15 +63,15 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     without forces, compared with others."""
     worst = 0.0
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
-        q, v = anywhere(vehicle, i)
+        q, v = random_states(vehicle, i)
         written, *engines = (
-            build(engine, vehicle, shaken(vehicle, frame, guide), STEP, STEP).acceleration(0.0, q, v)
+            build(engine, vehicle, random_wrenches(vehicle, frame, guide), STEP, STEP).acceleration(0.0, q, v)
             for engine in ENGINES
         )
         worst = max(worst, *(float(np.abs(a - written).max() / np.abs(written).max()) for a in engines))
-    q, v = anywhere(vehicle, 7)
+    q, v = random_states(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
-    written = build("reference", bare, static(bare, 3), STEP, STEP).acceleration(0.0, q, v)
+    written = build("reference", bare, static_forces(bare, 3), STEP, STEP).acceleration(0.0, q, v)
     slack = SpringDamper("none", vehicle.chassis, vehicle.uncut.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
     expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(0.0, q, v)
     expected -= GRAVITY * np.eye(len(q))[Z]
@@ -98,9 +98,9 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
 def _wrenches(vehicle: CutVehicle) -> Row:
     """Row: generalised forces of the hub wrenches by the compiled kernel, compared with those by MuJoCo's own
     Jacobians."""
-    (q, _), worst = anywhere(vehicle, 3), 0.0
+    (q, _), worst = random_states(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
-        hub_inputs = shaken(vehicle, frame, guide=False)
+        hub_inputs = random_wrenches(vehicle, frame, guide=False)
         built, bare = (
             build("mujoco", vehicle, replace(hub_inputs, hubs=part * hub_inputs.hubs), STEP, STEP)
             for part in (1.0, 0.0)
@@ -120,7 +120,9 @@ def _wrenches(vehicle: CutVehicle) -> Row:
 def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
     steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
     start[ROLL] = tilt
-    return build("mujoco", vehicle, static(vehicle, 2 * steps + 1, frame), STEP, duration).run(*np.split(start, 2))
+    return build("mujoco", vehicle, static_forces(vehicle, 2 * steps + 1, frame), STEP, duration).run(
+        *np.split(start, 2)
+    )
 
 
 def _gravity(vehicle: CutVehicle) -> list[Row]:
@@ -169,9 +171,9 @@ def _toppling(vehicle: CutVehicle) -> Row:
 def _noisy_free_runs(vehicle: CutVehicle, duration: float) -> Row:
     """Row: difference between free runs of all engines under the same noisy forces."""
     steps = round(duration / STEP)
-    hub_inputs = static(vehicle, steps + 1)
+    hub_inputs = static_forces(vehicle, steps + 1)
     noisy = HubForces(hub_inputs.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
-    paths = [model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
+    paths = [hub_model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
     return Observed(
         "hub_forces.engines_on_noise",
         SYSTEM,
@@ -197,8 +199,8 @@ def _reproduced(vehicle: CutVehicle) -> list[Row]:
     readings: tuple[Interpolation, ...] = ("linear", "smooth")
     for interpolation in readings:
         for every in (4, 2):
-            measured, _ = recorded(true, "hub", every)
-            run = model("mujoco", vehicle, measured, STEP, duration, interpolation).run()
+            measured, _ = recorded_measurement(true, "hub", every)
+            run = hub_model("mujoco", vehicle, measured, STEP, duration, interpolation).run()
             off[interpolation, every] = float(np.abs((run.states - true.states)[:, [ROLL, PITCH]]).max())
     order = np.log2(off["linear", 4] / off["linear", 2])
     return [
@@ -223,11 +225,11 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
     """Rows: ratios of an ensemble's mean squares to their laws. They follow a chi-square distribution with as many
     degrees of freedom as paths."""
     steps, step = round(LASTING / 2e-3), 2e-3
-    rest, deviation = static(vehicle, steps + 1), np.tile([20.0] * 3 + [4.0] * 3, len(vehicle.hubs))
+    rest, deviation = static_forces(vehicle, steps + 1), np.tile([20.0] * 3 + [4.0] * 3, len(vehicle.hubs))
     still = HubForces(rest.hubs, step, "hub")
     ends = np.array(
         [
-            model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, LASTING).run().states[-1]
+            hub_model("mujoco", vehicle, still.noisy(deviation, SEED, path), step, LASTING).run().states[-1]
             for path in range(COPIES)
         ]
     )
@@ -262,7 +264,7 @@ def _scene(frame: str) -> HubScene:
 def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     """Rows: difference between the engines before drift-off, errors of both angles with the filter, and damage that
     each run predicts."""
-    off = np.abs(comparison.errors(comparison.runs[FILTER])).max(axis=0)
+    off = np.abs(comparison.errors(comparison.runs[FILTERED_RUN])).max(axis=0)
     rows = [
         Observed(
             f"hub_forces.engines_{frame}",
@@ -331,8 +333,10 @@ def _faults(scene: HubScene) -> list[Row]:
     """
     vehicle, duration = r19(), 5.0
     hub_inputs = _rough(vehicle, duration)
-    clean, angles = recorded(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
-    in_space, _ = recorded(true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2)
+    clean, angles = recorded_measurement(true_run("mujoco", vehicle, hub_inputs, "hub", STEP, duration), "hub", 2)
+    in_space, _ = recorded_measurement(
+        true_run("mujoco", vehicle, hub_inputs, "inertial", STEP, duration), "inertial", 2
+    )
     parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {
@@ -350,7 +354,7 @@ def _faults(scene: HubScene) -> list[Row]:
         except InputError:
             said = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"
-        rows.append(behaves(f"hub_forces.fault_{i}", SYSTEM, quantity, said, expected, why))
+        rows.append(behaviour_row(f"hub_forces.fault_{i}", SYSTEM, quantity, said, expected, why))
     return rows
 
 

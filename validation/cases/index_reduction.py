@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.runge_kutta import step_on
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
-from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaves, not_run
-from validation.common.scenes import drive, force_scene, on_paper_road
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaviour_row, not_run
+from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 from validation.hard_cases.prescribed_pitch import AsItComes
 
 TITLE = "Drift by index reduction, and drift by noise"
@@ -70,7 +70,7 @@ class Files:
 
     def guided(self, file: str = "pitch.csv", **values: Any) -> Assembly:
         """Assembly of the vehicle whose pitch is prescribed by one of the files."""
-        return assemble(self.scene(prescribed_pitch={"file": file, **values}))
+        return assembly_of_scene(self.scene(prescribed_pitch={"file": file, **values}))
 
 
 @on_paper_road()
@@ -98,8 +98,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _drive(folder: Path, duration: float) -> Files:
     """Make a virtual measurement on the study road; write its forces, its pitch, and the pitch that a noisy gyro's
     integrated rate gives."""
-    measured = drive(folder, duration, STEP, STEP)
-    walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
+    measured = virtual_drive(folder, duration, STEP, STEP)
+    walk = WALK * np.sqrt(STEP) * np.cumsum(normal_samples(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
     return Files(folder, duration, measured["pitch"])
 
@@ -130,7 +130,7 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
 def _unguided_pitch_errors(files: Files) -> dict[str, np.ndarray]:
     """Difference (n,) in rad of pitch and true pitch under noisy forces and without a prescribed pitch, for several
     solvers."""
-    noisy = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+    noisy = assembly_of_scene(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
         "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
@@ -224,7 +224,7 @@ def _index_two_refused() -> Row:
         ended = "refused" if "useNewmark" in str(error) else str(error)
     else:
         ended = "answered"
-    return behaves(
+    return behaviour_row(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
         "outcome of Exudyn's generalised-alpha solver with its flag for index 2",
@@ -267,7 +267,7 @@ def _id(name: str) -> str:
 
 def draw(data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     for name, gap in data["gaps"].items():
@@ -284,7 +284,7 @@ def draw(data: Saved) -> Drawn:
         right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
     right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
     right.legend()
-    heading(figure, "Drift of a reduced constraint can be cured, drift by noise cannot")
+    add_heading(figure, "Drift of a reduced constraint can be cured, drift by noise cannot")
     for axis in (left, right):
         axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
     caption = (

@@ -6,13 +6,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from models.core.noise import GYRO, normal
+from models.core.noise import GYRO, normal_samples
 from models.core.time_series import write_time_series
-from models.drift.score import rms, section_forces
+from models.drift.score import root_mean_square, section_forces
 from models.sensors.inertial_unit import (
     DEGREES_PER_HOUR,
     angle_variance,
-    bias,
+    bias_path,
     error_rotation,
     euler_mean_square,
     euler_quaternions,
@@ -24,15 +24,23 @@ from models.sensors.inertial_unit import (
     random_walk,
     true_attitude,
 )
-from models.sensors.rotations import exponential, integrate, logarithm, matrix
+from models.sensors.rotations import exponential, integrate, rotation_matrix, rotation_vector
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
+from models.systems.pitch_plane.virtual_measurement import follower_builder, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
 from validation.common.rows import CaseAnswer, Observed, Row, System, not_run
 from validation.common.scenes import on_paper_road, road_scene
-from validation.drift.attitudes import SEED, START, cone, errors, largest_angle, standard_errors, turning
-from validation.drift.ten_minutes import DEVIATION, RATE, TEN_MINUTES
+from validation.drift.attitudes import (
+    SEED,
+    START_ATTITUDE,
+    attitude_errors,
+    coning_motion,
+    largest_angle,
+    standard_errors,
+    turning_rates,
+)
+from validation.drift.ten_minutes import RATE_DEVIATION, SAMPLING_RATE, TEN_MINUTES
 from validation.drift.ten_minutes import draw as draw
 from validation.drift.ten_minutes import tables as tables
 from validation.measured import recording
@@ -62,8 +70,8 @@ def _attitude_from_exact_rates() -> list[Row]:
     """Rows: error of the attitude integrated from exact rates, about a fixed axis and about an axis that moves on a
     cone."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
-    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
-    rates, true = cone(h * np.arange(10_001))
+    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
+    rates, true = coning_motion(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
     off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
     fixed, turned = "constant rate, 10 s at 1 kHz: largest error of the attitude", exponential(10 * rate)
@@ -91,7 +99,7 @@ def _one_axis(paths: int) -> list[Row]:
     rows = []
     for axis in range(3):
         deviation = EQUAL / PERIOD**0.5 * np.eye(3)[axis]
-        turns = logarithm(errors(np.zeros((200, 3)), PERIOD, deviation, paths))
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), PERIOD, deviation, paths))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -132,13 +140,16 @@ def _three_axes(paths: int) -> list[Row]:
     """Rows on noise about three axes: with equal noise the mean trace of the error; with unequal noise on a turning
     body the mean error matrix and the mean quaternion."""
     count = round(SPAN / PERIOD)
-    rates, root = turning(count, PERIOD), PERIOD**0.5
-    equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
-    wandered = errors(rates, PERIOD, UNEQUAL / root, paths)
-    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), mean_error(UNEQUAL, rates, PERIOD, START)
-    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
+    rates, root = turning_rates(count, PERIOD), PERIOD**0.5
+    equal = attitude_errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
+    wandered = attitude_errors(rates, PERIOD, UNEQUAL / root, paths)
+    trace, exact = (
+        np.trace(rotation_matrix(equal), axis1=1, axis2=2),
+        mean_error(UNEQUAL, rates, PERIOD, START_ATTITUDE),
+    )
+    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START_ATTITUDE)
     all_equal = np.full(3, EQUAL)
-    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START)))
+    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START_ATTITUDE)))
     return [
         _mean(
             "trace",
@@ -198,8 +209,8 @@ def _norms(paths: int) -> list[Row]:
     period = span / steps
     for axes in (1, 3):
         noise = np.zeros((steps, paths, 3))
-        noise[:, :, :axes] = normal(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
-        q = euler_quaternions(EQUAL * period**0.5 * noise, START)
+        noise[:, :, :axes] = normal_samples(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
+        q = euler_quaternions(EQUAL * period**0.5 * noise, START_ATTITUDE)
         square = np.sum(q**2, axis=1)
         law = euler_mean_square(EQUAL, axes, period, steps)
         scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
@@ -242,7 +253,7 @@ def _norms(paths: int) -> list[Row]:
 def _ten_minutes(paths: int) -> CaseAnswer:
     """Rows and data on the paper's example: 600 s of a car's motion at 1 kHz, with white noise of 0.1 rad/s on each
     gyro sample."""
-    walk = random_walk(DEVIATION, RATE)
+    walk = random_walk(RATE_DEVIATION, SAMPLING_RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [
@@ -271,10 +282,10 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     ]
     if not paths:
         return rows, {}
-    every = round(RATE)
-    t = np.arange(round(TEN_MINUTES * RATE)) / RATE
+    every = round(SAMPLING_RATE)
+    t = np.arange(round(TEN_MINUTES * SAMPLING_RATE)) / SAMPLING_RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
-    true = true_attitude(rates, 1 / RATE, START)[::every]
+    true = true_attitude(rates, 1 / SAMPLING_RATE, START_ATTITUDE)[::every]
     wandered = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(
         mean_square(
@@ -299,8 +310,10 @@ def _ten_minutes(paths: int) -> CaseAnswer:
 
 def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true`` (601, 4)."""
-    attitudes = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
-    return np.degrees(logarithm(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
+    attitudes = measured_attitude(
+        rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
+    )
+    return np.degrees(rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
@@ -311,7 +324,7 @@ def _bias(paths: int) -> list[Row]:
         ("wandering", 0.0, grade, 60),
         ("forgetful", 0.0, grade, 600),
     ):
-        angles = np.array([bias(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(paths)])
+        angles = np.array([bias_path(span, 1.0, turn_on, instability, tau, SEED, path).sum() for path in range(paths)])
         law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
         rows.append(
             mean_square(
@@ -335,7 +348,7 @@ def _section_forces() -> list[Row]:
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
         place = Path(name)
-        measured, follow = measure_road(scene), follower(scene, place)
+        measured, follow = measure_road(scene), follower_builder(scene, place)
         write_measurement(measured, place, scene.run.step)
         true = simulate(follow({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
         part = measured.times / scene.run.duration
@@ -349,7 +362,7 @@ def _section_forces() -> list[Row]:
             f"section.{name}",
             f"difference of {name} of a run guided by a pitch that goes wrong by {size} rad in 10 s from "
             "the true force turned by that angle, over the change",
-            rms(corrected[name] - turned[name]) / rms(turned[name] - before[name]),
+            root_mean_square(corrected[name] - turned[name]) / root_mean_square(turned[name] - before[name]),
             "",
             "f3 and f4 are those of the true run: a slow angle error leaves no inertia force",
             0.01,
@@ -363,7 +376,7 @@ def _recording(paths: int) -> CaseAnswer:
     motion."""
     path = recording.find()
     if path is None:
-        reason = f"needs {recording.FILE} in the folder that TWINRIG_DATA names"
+        reason = f"needs {recording.RECORDING_FILE} in the folder that TWINRIG_DATA names"
         return [
             not_run(f"inertial_unit.recording{end}", SYSTEM, f"a minute in a real car: {what}", reason)
             for end, what in (("", "gyro against camera"), (".law", "noise law on its motion"))
@@ -372,8 +385,8 @@ def _recording(paths: int) -> CaseAnswer:
     off = np.degrees(recording.gyro_error(recorded))
     rates, period = recorded.rates[::5], 5 * recording.PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
-    wandered = errors(rates, period, deviation, paths)
-    law = mean_error(deviation * period**0.5, rates, period, START)
+    wandered = attitude_errors(rates, period, deviation, paths)
+    law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
     return [
         Observed(
             "inertial_unit.recording",

@@ -18,11 +18,11 @@ import numpy as np
 
 from models.drawing.figures import LABELS
 from models.engines.stability import linearised
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import CaseAnswer, Observed, Saved, System, Table, not_run
 from validation.common.scenes import road_scene
 from validation.price import instructions_run
-from validation.price.tables import named
+from validation.price.tables import curve_name
 
 TITLE = "Instructions per step"
 SYSTEM: System = "cost"
@@ -82,7 +82,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _instructions(folder: Path) -> np.ndarray:
     """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler dumps them between the marches."""
     folder.mkdir()
-    mass, damping, stiffness, *_ = linearised(assemble(road_scene()).vehicle)
+    mass, damping, stiffness, *_ = linearised(assembly_of_scene(road_scene()).vehicle)
     march = {
         "masses": np.diag(mass).tolist(),
         "damping": damping.tolist(),
@@ -121,7 +121,7 @@ def _total(dump: Path) -> int:
 
 def tables(data: Saved) -> list[Table]:
     """Instructions per step, where they were counted."""
-    rows = tuple((named(curve), f"{count / 1e3:,.1f}") for curve, count in data["instructions"].items())
+    rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in data["instructions"].items())
     note = (
         f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
         "function, which they include: the engine, the way into Python and a law there. The start of a run is "

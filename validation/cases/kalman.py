@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from models.drift.innovations import LEVEL as ALARMS
+from models.drift.innovations import FALSE_ALARM_SHARE as ALARMS
 from models.drift.innovations import consistency
-from models.drift.score import CHANNELS
-from models.systems.pitch_plane.pitch_filter import PITCH, RATE
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
+from models.drift.score import SECTION_FORCE_CHANNELS
+from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.common.scenes import on_paper_road
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
@@ -21,8 +21,8 @@ from validation.drift.kalman_runs import (
     closed_loop,
     gyro_alone,
     loop_errors,
+    scores_of_stabilised,
     spread_of_mean_square,
-    stabilised,
     with_gaps,
 )
 
@@ -40,12 +40,14 @@ OUTAGE, LOST = (20.0, 25.0), 0.3
 """s without any measurement, and share of all other samples that are lost."""
 FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 """Factors on the variances of force noise and measurement noise that a filter is told."""
-SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
+SENSORS = {"angle": (PITCH,), "rate": (PITCH_RATE,), "angle and rate": (PITCH, PITCH_RATE)}
 
 
 @on_paper_road()
-@allowing("models and deviations are wrong on purpose: the filter is to hold the run all the same", "innovations")
-@allowing("without a measured pitch a run is lost, which is what is shown", "upright")
+@allowing_breaches(
+    "models and deviations are wrong on purpose: the filter is to hold the run all the same", "innovations"
+)
+@allowing_breaches("without a measured pitch a run is lost, which is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
     place = folder / "kalman"
@@ -57,8 +59,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     rows += _gap_rows(place, 40.0, OUTAGE, tuple(SENSORS))
     loop_rows, deviations = _loop_rows(place)
     gyro = gyro_alone(place, 600.0, SEED)
-    damage = [stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
-    right = [stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
+    damage = [scores_of_stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
+    right = [scores_of_stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
@@ -119,7 +121,7 @@ def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
-    return behaves(
+    return behaviour_row(
         f"kalman.{name}",
         SYSTEM,
         f"{words} of a filter that assumes 4 times the variance of the {noise}",
@@ -170,7 +172,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
 
 
 def _short_rows(folder: Path) -> list[Row]:
-    error = stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
+    error = scores_of_stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
     return [Observed("kalman.short", SYSTEM, what, error, "rad").at_most(5e-3, why, "none")]
@@ -240,7 +242,7 @@ def _gyro_rows(gyro: dict[str, float]) -> list[Row]:
 def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     rows = []
     for engine in ENGINES:
-        for name in CHANNELS:
+        for name in SECTION_FORCE_CHANNELS:
             ratios = np.array([each[engine][name] for each in damage])
             why = (
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
@@ -293,7 +295,7 @@ def tables(data: Saved) -> list[Table]:
     """Damage and moments per implementation, and the deviations of the linear closed loop."""
     if not data["damage"]:
         return []
-    keys = (*CHANNELS, "pull", "all, band", "pitch")
+    keys = (*SECTION_FORCE_CHANNELS, "pull", "all, band", "pitch")
     rows = tuple(
         (
             engine,
@@ -311,7 +313,7 @@ def tables(data: Saved) -> list[Table]:
     )
     heads = (
         "engine",
-        *(f"D({name})" for name in CHANNELS),
+        *(f"D({name})" for name in SECTION_FORCE_CHANNELS),
         "moment that draws",
         "all moments, to 15 Hz",
         "pitch error",

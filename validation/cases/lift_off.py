@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from models.core.result import Result
-from models.core.scene_effects import without
-from models.drift.score import rms
+from models.core.scene_effects import scene_without
+from models.drift.score import root_mean_square
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
@@ -15,20 +15,20 @@ from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.ride.nonlinear import ridden
+from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
-from validation.common.bounces import Bounces, energy
+from validation.common.bounces import Bounces, bounce_energy
 from validation.common.checks import acceleration_gap
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
+from validation.common.scenes import STUDY_ROAD, VEHICLE_SETS, largest_difference
 
 TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"
@@ -46,7 +46,7 @@ UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
-    vehicles = VEHICLES[-1:] if quick else VEHICLES
+    vehicles = VEHICLE_SETS[-1:] if quick else VEHICLE_SETS
     rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
     rows += [
         *_bounces_by_exponentials(0.5 if quick else 2.0),
@@ -57,7 +57,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def scene(
-    parameters: str = VEHICLES[-1],
+    parameters: str = VEHICLE_SETS[-1],
     geometry: str = "exact",
     duration: float = 1.0,
     step: float = STEP,
@@ -82,7 +82,7 @@ def _accelerations(parameters: str) -> list[Row]:
     rows = []
     for geometry in ("exact", "linear"):
         lifting = scene(parameters, geometry, 2.0, 1e-3, road=True)
-        assembly = assemble(lifting)
+        assembly = assembly_of_scene(lifting)
         for engine in ENGINES:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
@@ -110,7 +110,7 @@ def _paths(parameters: str, duration: float) -> list[Row]:
             SYSTEM,
             f"largest difference of the states in {engine} from the reference over {duration:g} s of "
             f"the study road, {parameters}",
-            gap(runs[engine], runs["reference"]),
+            largest_difference(runs[engine], runs["reference"]),
             STATES,
         ).at_most(1e-11, f"{ROUNDING}; each landing makes the difference some times as large", "native")
         for engine in ENGINES
@@ -132,7 +132,7 @@ def _loads(run: Result) -> np.ndarray:
     return np.array([run["f1"], run["f2"]])
 
 
-@allowing(
+@allowing_breaches(
     "dropped so hard that every law is met far out; the other side has the same laws",
     "springs compressed",
     "tyres not flat",
@@ -143,7 +143,7 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
         lifting = scene(geometry="linear", duration=duration, override=override)
-        assembly = assemble(lifting)
+        assembly = assembly_of_scene(lifting)
         exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in IMPLEMENTATIONS:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
@@ -161,7 +161,7 @@ def _bounces_by_exponentials(duration: float) -> list[Row]:
     return rows
 
 
-@allowing(
+@allowing_breaches(
     "dropped so hard that every law is met far out; the other side has the same laws",
     "springs compressed",
     "tyres not flat",
@@ -170,7 +170,7 @@ def _order(halvings: int) -> Row:
     """Row: observed order of the error in the step, for a run with landings."""
     lifting = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
-    exact = Bounces(assemble(lifting), coarse).path(assemble(lifting).initial, round(1.0 / coarse))
+    exact = Bounces(assembly_of_scene(lifting), coarse).path(assembly_of_scene(lifting).initial, round(1.0 / coarse))
     errors = []
     for step in steps:
         states = simulate(lifting, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
@@ -181,7 +181,7 @@ def _order(halvings: int) -> Row:
     return Observed("lift_off.order", SYSTEM, what, slope, "").beside(2.0, why, "closed form")
 
 
-@allowing(
+@allowing_breaches(
     "dropped so hard that every law is met far out; the other side has the same laws",
     "springs compressed",
     "tyres not flat",
@@ -192,8 +192,8 @@ def _energy(duration: float) -> list[Row]:
     for engine in IMPLEMENTATIONS:
         undamped = scene(duration=duration, override=UNDAMPED)
         states = simulate(undamped, engine).states
-        energies = energy(assemble(undamped), states)
-        size = energies[0] - energy(assemble(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
+        energies = bounce_energy(assembly_of_scene(undamped), states)
+        size = energies[0] - bounce_energy(assembly_of_scene(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
         rows.append(
             Observed(
                 f"lift_off.energy.{engine}",
@@ -204,7 +204,7 @@ def _energy(duration: float) -> list[Row]:
             ).at_most(1e-4, "the error of the step", "closed form")
         )
         damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
-        energies = energy(assemble(damped), simulate(damped, engine).states)
+        energies = bounce_energy(assembly_of_scene(damped), simulate(damped, engine).states)
         gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(
             Observed(
@@ -218,14 +218,17 @@ def _energy(duration: float) -> list[Row]:
     return rows
 
 
-@allowing("what the linear tyre does is what is shown")
+@allowing_breaches("what the linear tyre does is what is shown")
 def _pulls(quick: bool) -> list[Row]:
     """Rows: how strongly and how often the paper's linear tyre pulls on the study road, and how this changes the wheel
     loads."""
-    lifting_scene = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
-    lifting, linear = simulate(lifting_scene, "reference"), simulate(without(lifting_scene, "lift_off"), "reference")
+    lifting_scene = scene(VEHICLE_SETS[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
+    lifting, linear = (
+        simulate(lifting_scene, "reference"),
+        simulate(scene_without(lifting_scene, "lift_off"), "reference"),
+    )
     loads = _loads(linear)
-    deviations = [rms(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
+    deviations = [root_mean_square(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {lifting_scene.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
     words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
@@ -273,7 +276,9 @@ def _in_space(quick: bool) -> list[Row]:
             error = float(np.abs(model.acceleration(0.0, q, v, road) - wanted).max() / np.abs(wanted).max())
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
-    first, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES)
+    first, two = (
+        drive_over_road(engine, car, path, 1.0 if quick else 10.0, seed=SEED, stride=20).run for engine in ENGINES
+    )
     apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
         *(

@@ -12,25 +12,25 @@ from models.measured.checks import check
 from models.measured.faults_of_measurement import Faults
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import GRAVITY
-from validation.common.rows import Observed, Row, System, Table, behaves, not_run
+from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured import measured_car
 from validation.measured import recording as car
 from validation.measured.planted import (
     NOISE,
     SEED,
-    Planted,
+    PlantedMeasurementFault,
     Ride,
-    clipped,
-    drifting,
+    clipped_channel,
+    drifting_findings,
     drop_samples,
     errors_and_doubts,
-    exchanged,
+    exchanged_hubs,
     hold_sample,
     measurement,
-    planted,
-    referred,
-    spiked,
-    times,
+    moments_about_point,
+    planted_findings,
+    scaled_channels,
+    spiked_channel,
 )
 from validation.spatial.cars import r19
 
@@ -45,9 +45,11 @@ VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES = 180 / np.pi
 DELAY = 3e-3
 QUICK = (
-    Planted("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
-    Planted("left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged(("fl", "fr"))),
-    Planted("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
+    PlantedMeasurementFault("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
+    PlantedMeasurementFault(
+        "left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged_hubs(("fl", "fr"))
+    ),
+    PlantedMeasurementFault("gap of 0.5 s", "gaps", "rr_fz", 0.5, "s", drop_samples("rr_fz", 3.0, 0.5)),
 )
 AMOUNTS: tuple[tuple[str, str, str, float, str, str, dict[str, float]], ...] = (
     ("3 ms late, one hub", "shift", "all channels of rr", DELAY, "s", "delay", {"rr": DELAY}),
@@ -93,24 +95,31 @@ LEVERS = {
 }
 FULL = (
     *(
-        Planted(name, check, place, size, unit, faults={key: amounts})
+        PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
         for name, check, place, size, unit, key, amounts in AMOUNTS
     ),
-    Planted("gravity not included", "gravity", "tower_az", 9.81, "m/s^2", times(1.0, "tower_az", add=-9.81)),
-    *(Planted(name, check, of[0], factor, "1", times(factor, *of)) for name, check, factor, of in FACTORS),
+    PlantedMeasurementFault(
+        "gravity not included", "gravity", "tower_az", 9.81, "m/s^2", scaled_channels(1.0, "tower_az", add=-9.81)
+    ),
     *(
-        Planted(name, "swapped", " and ".join(f"{a} with {b}" for a, b in pairs), 1.0, "", exchanged(*pairs))
+        PlantedMeasurementFault(name, check, of[0], factor, "1", scaled_channels(factor, *of))
+        for name, check, factor, of in FACTORS
+    ),
+    *(
+        PlantedMeasurementFault(
+            name, "swapped", " and ".join(f"{a} with {b}" for a, b in pairs), 1.0, "", exchanged_hubs(*pairs)
+        )
         for name, pairs in SWAPPED.items()
     ),
     *(
-        Planted(name, "lever", " and ".join(hubs), lever, "m", referred(lever, *hubs))
+        PlantedMeasurementFault(name, "lever", " and ".join(hubs), lever, "m", moments_about_point(lever, *hubs))
         for name, (lever, hubs) in LEVERS.items()
     ),
-    Planted("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", clipped("fl_fz", 0.005)),
-    Planted("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", hold_sample("rl_mx", 4.0, 0.3)),
-    Planted("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", hold_sample("fl_fz", 4.0, 0.06)),
-    Planted("spike of one sample", "spikes", "rl_my", 2e3, "N m", spiked("rl_my", 4.0, 2e3)),
-    Planted("dead channel", "clipped", "rl_mx", 15.0, "s", times(0.0, "rl_mx")),
+    PlantedMeasurementFault("clipped, 0.5 % of samples", "clipped", "fl_fz", 0.5, "%", clipped_channel("fl_fz", 0.005)),
+    PlantedMeasurementFault("value held for 0.3 s", "clipped", "rl_mx", 0.3, "s", hold_sample("rl_mx", 4.0, 0.3)),
+    PlantedMeasurementFault("value held for 0.06 s", "clipped", "fl_fz", 0.06, "s", hold_sample("fl_fz", 4.0, 0.06)),
+    PlantedMeasurementFault("spike of one sample", "spikes", "rl_my", 2e3, "N m", spiked_channel("rl_my", 4.0, 2e3)),
+    PlantedMeasurementFault("dead channel", "clipped", "rl_mx", 15.0, "s", scaled_channels(0.0, "rl_mx")),
 )
 
 
@@ -119,10 +128,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, said = [], dict[str, str]()
     for fault in QUICK if quick else QUICK + FULL:
-        findings = planted(virtual, folder, fault.spoil, **fault.faults)
+        findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
         rows += _rows(fault, findings)
         said[fault.name] = findings[0].text if findings else "nothing"
-    rows.append(_clean_recordings_row("quick", [planted(virtual, folder)]))
+    rows.append(_clean_recordings_row("quick", [planted_findings(virtual, folder)]))
     if not quick:
         rows += [
             *_clean_recordings(folder),
@@ -130,7 +139,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             *_three_faults_rows(virtual, folder),
             _spread(virtual, folder),
         ]
-        size = 1e6 * _size(drifting(virtual, 5e-4, folder), "drift")
+        size = 1e6 * _size(drifting_findings(virtual, 5e-4, folder), "drift")
         rows += [_sized("clocks", "drift between the clocks of two files", size, "1e-6", 500.0), *_moving_car(folder)]
     return rows, {"said": said}
 
@@ -155,7 +164,7 @@ def _row_of_no_findings(key: str, quantity: str, texts: list[str], why: str) -> 
     return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
 
 
-def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
+def _rows(fault: PlantedMeasurementFault, findings: tuple[Finding, ...]) -> list[Row]:
     """Rows on one planted fault: it is named at the right place, no other fault is named, and its size is right."""
     key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
     named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
@@ -163,7 +172,9 @@ def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
     word = "named" if named and alone else f"{[finding.check for finding in findings]}"
     why = f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else"
     rows = [
-        behaves(f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why)
+        behaviour_row(
+            f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why
+        )
     ]
     if fault.check != "swapped":
         size = _size(findings, fault.check, fault.place)
@@ -187,7 +198,8 @@ def _clean_recordings(folder: Path) -> list[Row]:
     each."""
     return [
         _clean_recordings_row(
-            vehicle, [planted(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)]
+            vehicle,
+            [planted_findings(measurement(vehicle, road), folder, seed=seed) for road in roads for seed in range(2)],
         )
         for vehicle, roads in (("r19_free", ROADS), ("twin", ROADS[1::2]))
     ]
@@ -220,8 +232,8 @@ def _wrong_vehicles(folder: Path) -> list[Row]:
 
 def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     """Rows: three faults at once are all named."""
-    spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
-    findings = planted(virtual, folder, *spoil, delay={"rl_fz": DELAY})
+    spoil = exchanged_hubs(("fl", "fr")), scaled_channels(1e-3, "rr_fz")
+    findings = planted_findings(virtual, folder, *spoil, delay={"rl_fz": DELAY})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
         ", ".join(sorted({f.check for f in findings})),
@@ -229,14 +241,14 @@ def _three_faults_rows(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     id = "measured_checks.together.named"
     last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
-        behaves(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
+        behaviour_row(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
         _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", DELAY),
     ]
 
 
 def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
     """Row: mean of the delay found in one channel over several noise samples, as a check of its bias."""
-    samples = [planted(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
+    samples = [planted_findings(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
     late = 1e3 * float(
         np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )
@@ -255,7 +267,7 @@ def _moving_car(folder: Path) -> list[Row]:
     clean = measured_car.samples(path)
     degrees, down = clean.copy(), clean.copy()
     degrees[:, 4] *= DEGREES
-    down[:, :6] *= np.tile(measured_car.TURNED, 2)
+    down[:, :6] *= np.tile(measured_car.TELEPHONE_TO_CAR, 2)
     findings = {
         name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
         for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
@@ -268,7 +280,7 @@ def _moving_car(folder: Path) -> list[Row]:
     size = turned[0].size if turned and turned[0].size is not None else float("nan")
     what = "moving car with axes right and down, taken for left and up: faults named"
     return [
-        behaves(
+        behaviour_row(
             "measured_checks.car.errors",
             SYSTEM,
             "errors named in a moving car's accelerometers, gyros and pose",
@@ -276,7 +288,7 @@ def _moving_car(folder: Path) -> list[Row]:
             "none",
             "signs and units are right",
         ),
-        behaves(
+        behaviour_row(
             "measured_checks.car.down",
             SYSTEM,
             what,

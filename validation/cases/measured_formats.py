@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.fatigue.damage import pseudo_damage
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import ChannelGroup
-from validation.common.rows import Observed, Row, System, Table, behaves, not_run
+from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured.measured_files import csv_forms, kinds
 from validation.measured.measured_files.odd import OddFile, read
 from validation.measured.measured_files.own_libraries import LIBRARIES
@@ -41,7 +41,7 @@ COUNT, PERIOD, LENGTH = 5000, 1e-3, 1234
 
 def samples() -> np.ndarray:
     """Values (count, 3) of many sizes, with a gap."""
-    values = normal(SEED, 0, COUNT, 3) * np.array([1e3, 1e-6, 1.0])
+    values = normal_samples(SEED, 0, COUNT, 3) * np.array([1e3, 1e-6, 1.0])
     values[100:200, 1] = np.nan
     return values
 
@@ -123,7 +123,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"{key}.times", SYSTEM, f"{form}: largest change of times that are written and read", off, "s"
         ).at_most(1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
-        behaves(
+        behaviour_row(
             f"{key}.texts",
             SYSTEM,
             f"{form}: names with umlauts, units, comments of two lines and the start survive writing and reading",
@@ -200,7 +200,7 @@ def forms(folder: Path) -> list[Row]:
             silent,
             "files",
         ).at_most(0.0, f"{why}; each refusal says what to do", "none"),
-        behaves(
+        behaviour_row(
             "measured_formats.forms.crashes",
             SYSTEM,
             f"errors that are no refusal or that say too little, of {len(files)} such files",
@@ -225,7 +225,7 @@ def _difference_or_error(odd: OddFile, folder: Path) -> float | str | None:
 def wheel_force() -> np.ndarray:
     """A wheel force (N) of ten seconds at 1 kHz, with one pothole whose force is forty times that of the normal
     road."""
-    load = np.convolve(normal(SEED, 1, 10_000, 1)[:, 0], np.ones(20) / 20.0, mode="same") * 450.0
+    load = np.convolve(normal_samples(SEED, 1, 10_000, 1)[:, 0], np.ones(20) / 20.0, mode="same") * 450.0
     load[5000:5020] += 8e4 * np.sin(np.linspace(0.0, np.pi, 20)) / 2
     return load
 
@@ -273,7 +273,7 @@ def memory(path: Path, extension: str) -> list[Row]:
     key, form = f"measured_formats.{extension[1:]}.memory", FORMATS[extension]
     if not STATUS.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
-    count, base = 300_000, 1e3 * normal(SEED, 2, 60_000, 60)
+    count, base = 300_000, 1e3 * normal_samples(SEED, 2, 60_000, 60)
     blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
     write(path, [ChannelGroup(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
     out = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, check=True).stdout

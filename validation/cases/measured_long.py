@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from models.engines.cut_vehicle import build
-from models.fatigue.counting import count, level_crossings, range_pairs
-from models.fatigue.rainflow_cycles import cycles
+from models.fatigue.counting import counted_load, level_crossings, range_pairs
+from models.fatigue.rainflow_cycles import rainflow_cycles
 from models.measured.formats import open_source
-from models.measured.signal import HUB
+from models.measured.signal import HUB_COMPONENTS
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.section_run import AttitudeHold, run
-from models.systems.measured.sections import Sections, guided
-from models.systems.measured.verdict import checks, compare
+from models.systems.measured.sections import Sections, guided_bodies
+from models.systems.measured.verdict import channels_to_compare, compare
 from models.vehicles.cut_vehicle import cut
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.measured.long_recording import SEED, answers_of, killed, run_of
-from validation.spatial.cars import anywhere, shaken, twin
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.measured.long_recording import SEED, answers_of, run_killed_process, run_of
+from validation.spatial.cars import random_states, random_wrenches, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
@@ -52,10 +52,10 @@ def _guides(quick: bool) -> list[Row]:
     engines' own sensors."""
     car, worst = cut(twin(), "body"), 0.0
     sections = Sections(car, "hub")
-    drive = shaken(car, "hub", guide=False)
+    drive = random_wrenches(car, "hub", guide=False)
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
     for seed in range(1 if quick else 5):
-        q, v = anywhere(car, seed)
+        q, v = random_states(car, seed)
         guided, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
         worst = max(worst, float(np.abs(guided - other).max() / np.abs(other).max()))
     rows = [
@@ -70,7 +70,7 @@ def _guides(quick: bool) -> list[Row]:
     ]
     if quick:
         return rows
-    q, v = anywhere(car, 0)
+    q, v = random_states(car, 0)
     for i, (body, freedom) in enumerate(car.tree.coordinates()):
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
     guided, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
@@ -93,21 +93,24 @@ def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.n
     read = sections.read(numbers, np.concatenate((q, v))[None], 2)[0]
     values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
     return np.array(
-        [[values.get(f"{name} guide {axis}", 0.0) for axis, *_ in HUB] for name in guided(sections.vehicle)]
+        [
+            [values.get(f"{name} guide {axis}", 0.0) for axis, *_ in HUB_COMPONENTS]
+            for name in guided_bodies(sections.vehicle)
+        ]
     )
 
 
 def _counting() -> list[Row]:
     """Rows: rainflow counting of the standard's example, and damage and counts of a sine, which are known exactly."""
-    spans, _, counts = cycles(ASTM)
+    spans, _, counts = rainflow_cycles(ASTM)
     by_span = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
     sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
-    counted = count(sine, (5.0,))
+    counted = counted_load(sine, (5.0,))
     levels = level_crossings(sine, np.array([-1.1, -0.5, 0.5, 1.1])).tolist()
-    spans, _, counts = cycles(sine[np.r_[0, 16:6400:32, 6400]])
+    spans, _, counts = rainflow_cycles(sine[np.r_[0, 16:6400:32, 6400]])
     pairs = range_pairs(spans, counts, np.array([0.5, 1.5])).tolist()
     return [
-        behaves(
+        behaviour_row(
             "measured_long.astm",
             SYSTEM,
             "rainflow counts of the example of ASTM E1049-85",
@@ -123,7 +126,7 @@ def _counting() -> list[Row]:
             counted.damage[5.0],
             "1",
         ).within(99.5 * 2**5 + 2 * 0.5, 1e-9, "199 half cycles of 2 and two of 1 at the ends", "closed form"),
-        behaves(
+        behaviour_row(
             "measured_long.levels",
             SYSTEM,
             "level crossings of a sine at -1.1, -0.5, 0.5, 1.1, and range pairs of at least 0.5 and 1.5",
@@ -163,7 +166,7 @@ def _run_killed_twice(folder: Path) -> Row:
         place.mkdir()
         job = run_of(place, seconds, REPEATED)
         if times:
-            killed(place, seconds, REPEATED, 0.25, times)
+            run_killed_process(place, seconds, REPEATED, 0.25, times)
         else:
             run(job, place / "run")
         bits.append(np.frombuffer(answers_of(place), np.int64))
@@ -222,7 +225,7 @@ def _handed_on(folder: Path) -> list[Row]:
         worst = max(worst, float(np.abs(read - values).max() / np.abs(values).max()))
         said |= {(channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names}
     kept = said == {(answer.name, answer.unit, answer.comment) for answer in wanted}
-    compared = [compare(job.recording, outcome, *pair) for pair in checks(job)]
+    compared = [compare(job.recording, outcome, *pair) for pair in channels_to_compare(job)]
     force = next(each for each in compared if each.signal.name == "front left_force")
     return [
         Observed(
@@ -232,7 +235,7 @@ def _handed_on(folder: Path) -> list[Row]:
             worst,
             "1",
         ).at_most(2.0**-24, "RPC III keeps singles, the others every bit", "native"),
-        behaves(
+        behaviour_row(
             "measured_long.handed_on_names",
             SYSTEM,
             "names, units and comments of section forces survive writing and reading",
@@ -244,7 +247,7 @@ def _handed_on(folder: Path) -> list[Row]:
             "measured_long.check_channel",
             SYSTEM,
             "share of a measured spring force's variance that the stabilised run does not explain",
-            1.0 - force.explained,
+            1.0 - force.explained_variance,
             "1",
         ).at_most(0.01, "noise of 8 N on 100 N, and what the filter adds", "native"),
     ]

@@ -16,17 +16,23 @@ from models.measured.checks import check as check_recording
 from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
 from models.measured.recording import Recording
-from models.systems.hub_forces.measurement import HubForces, model
+from models.systems.hub_forces.measurement import HubForces, hub_model
 from models.systems.measured.run import read_files as read_files
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
-from models.systems.measured.trust import Level, drift
-from models.systems.measured.verdict import errors, judge, judge_beside_truth
-from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, group, map_lines, virtual_measurement
+from models.systems.measured.trust import Level, predicted_drift
+from models.systems.measured.verdict import errors_of_run, judge, judge_beside_truth
+from models.systems.measured.virtual import (
+    VirtualMeasurement,
+    VirtualTable,
+    channel_group,
+    map_lines,
+    virtual_measurement,
+)
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
-from validation.common.rows import Observed, Row, System, Table, behaves, not_run
+from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured import measured_car
 from validation.measured import recording as moving_car
 
@@ -115,7 +121,7 @@ def recorded(
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
     for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -RECORDER_DELAY)):
         signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
-        write(folder / f"{name}.{format_name}", [group(signals, samples[:, chosen], virtual.period)])
+        write(folder / f"{name}.{format_name}", [channel_group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{format_name}", offset))
     (folder / "scene.toml").write_text("\n".join(text))
     if (taken := folder.parent / vehicle).is_file():
@@ -145,7 +151,7 @@ def _run_all_formats(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, d
             values = recording.columns.block(recording.columns.names, 0, recording.count)
             damage = next((damages for other, damages in known if _differ_by_rounding(values, other)), None)
             if damage is None:
-                damage = errors(march(held_run(recording, true.vehicle, proof.hold), place / "run"), true).damage
+                damage = errors_of_run(march(held_run(recording, true.vehicle, proof.hold), place / "run"), true).damage
                 known.append((values, damage))
             ratios[form].append(damage)
     means = {
@@ -223,7 +229,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
             apart,
             "1",
         ).at_most(1e-6, "same tableau, same step", "shared kernel"),
-        behaves(
+        behaviour_row(
             f"measured_virtual.verdict_{proof.name}",
             SYSTEM,
             f"verdict of the stabilised run without the truth; {proof.name}",
@@ -234,7 +240,7 @@ def _rows_of_other_runs(proof: Proof, first: Recording, true: VirtualMeasurement
         ),
     ]
     level = Level(NOISE["force"], NOISE["moment"])
-    until = drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted
+    until = predicted_drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted_time
     try:
         run = march(free, folder / "free")
     except RunFailed as error:
@@ -267,7 +273,7 @@ def _trust_times() -> list[Row]:
     for name, frame, duration, level in cases:
         virtual = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
         true = virtual_measurement(vehicle, virtual, "mujoco")
-        predicted = drift(vehicle, level, 1 / RATE, duration, frame).passes()
+        predicted = predicted_drift(vehicle, level, 1 / RATE, duration, frame).passing_time()
         assert predicted is not None
         drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(
@@ -289,7 +295,9 @@ def _drift_off(vehicle: CutVehicle, true: VirtualMeasurement, level: Level, path
     deviation = np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
     start = np.zeros(2 * vehicle.size)
     start[[ROLL, PITCH]] = level.tilt
-    run = model("mujoco", vehicle, forces.noisy(deviation, SEED, path), true.step, float(true.run.times[-1]), "smooth")
+    run = hub_model(
+        "mujoco", vehicle, forces.noisy(deviation, SEED, path), true.step, float(true.run.times[-1]), "smooth"
+    )
     states = run.marched(*np.split(start, 2)).states
     off = np.abs((states - true.run.states[: len(states)])[:, [ROLL, PITCH]]).max(axis=1) > 0.05
     return float(true.run.times[off.argmax()]) if off.any() else np.inf
@@ -306,7 +314,7 @@ def _moving(folder: Path) -> list[Row]:
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
         id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
-        return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.FILE}")]
+        return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.RECORDING_FILE}")]
     scene = measured_car.scene(path, cut(load_vehicle("r19_free"), "body"), folder)
     recording = read_files(scene, folder)
     said = check_recording(recording, None, scene.places, {})
@@ -336,10 +344,10 @@ def _quick(folder: Path) -> list[Row]:
     samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)
     recording = recorded(true, samples, proof.vehicle, "csv", folder / "quick")
     run = march(held_run(recording, true.vehicle, proof.hold), folder / "quick" / "run")
-    wrong = errors(run, true)
+    wrong = errors_of_run(run, true)
     level = Level(8.0, 1.0)
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
-    deviations = drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
+    deviations = predicted_drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
     return [
         Observed(
             "measured_virtual.values",

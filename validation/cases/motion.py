@@ -4,32 +4,32 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.noise import ACCELEROMETERS, normal
-from models.drift.score import rms
+from models.core.noise import ACCELEROMETERS, normal_samples
+from models.drift.score import root_mean_square
 from models.engines.protocol import build
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
-    Start,
+    StartState,
     angular_acceleration,
+    fit_quality,
     integrate_rates,
-    motion,
-    quality,
     rates_up_to_sign,
-    spin,
+    recovered_motion,
+    spin_from_readings,
     tilt_displacement,
 )
-from models.sensors.rotations import skew
+from models.sensors.rotations import skew_matrix
 from models.sensors.sensor_array import SensorArray, sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.scene import assembly_of_scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.bands import mean_square
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
 from validation.common.scenes import on_paper_road
 from validation.hard_cases.case import IMPLEMENTATIONS
-from validation.spatial.spatial_motion import ARRAYS, PATH, tilted
-from validation.spatial.spatial_motion import readings as readings_on_path
+from validation.spatial.spatial_motion import PATH, SENSOR_ARRANGEMENTS, tilted_sensors
+from validation.spatial.spatial_motion import sensor_readings as readings_on_path
 
 TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
@@ -53,7 +53,7 @@ BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
-    rows = [row for name in ARRAYS for row in _rows_without_integration(name)]
+    rows = [row for name in SENSOR_ARRANGEMENTS for row in _rows_without_integration(name)]
     rows += [_plain(), _order(), _tilt()]
     gains, gain_rows = _gains(4000 if quick else 40_000)
     rows += gain_rows
@@ -65,9 +65,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _rows_without_integration(name: str) -> list[Row]:
     """Rows: errors of quantities that need no integration, on a motion whose derivatives are known in closed form."""
-    array = sensor_array(ARRAYS[name])
+    array = sensor_array(SENSOR_ARRANGEMENTS[name])
     clean = readings_on_path(array.positions)
-    spins, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
+    spins, key = spin_from_readings(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
     what = f"sensors: {name}{', formula for a plane' if array.planar else ''}"
@@ -80,7 +80,7 @@ def _rows_without_integration(name: str) -> list[Row]:
             float(np.abs(squares).max()),
             "rad^2/s^2",
         ),
-        ("consistency", "share of the readings that no rigid body explains", quality(array, clean).share, ""),
+        ("consistency", "share of the readings that no rigid body explains", fit_quality(array, clean).share, ""),
     )
     return [
         Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(BOUND, why, "closed form")
@@ -90,7 +90,7 @@ def _rows_without_integration(name: str) -> list[Row]:
 
 def _plain() -> Row:
     """Row: angular acceleration by eq. (18) exactly as printed, which is wrong if all sensors lie in a plane."""
-    floor = np.array(list(ARRAYS["5 in a plane"].values()))
+    floor = np.array(list(SENSOR_ARRANGEMENTS["5 in a plane"].values()))
     relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
     plain = 0.5 * (m[:, 2, 1] - m[:, 1, 2])
@@ -108,10 +108,12 @@ def _plain() -> Row:
 
 def _order() -> Row:
     """Row: order of convergence in the sampling period of the position recovered from the readings."""
-    array = sensor_array(ARRAYS["5 in a tilted plane"])
+    array = sensor_array(SENSOR_ARRANGEMENTS["5 in a tilted plane"])
     clean = readings_on_path(array.positions)
     errors = [
-        float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
+        float(
+            np.abs(recovered_motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max()
+        )
         for n in (40, 20)
     ]
     return Observed(
@@ -124,9 +126,9 @@ def _order() -> Row:
 
 
 def _tilt() -> Row:
-    array, tilt, count = sensor_array(ARRAYS["4"]), 1e-3, 10_001
+    array, tilt, count = sensor_array(SENSOR_ARRANGEMENTS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    drift = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
+    drift = -recovered_motion(array, still, 1e-3, StartState.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
     what = (
         f"relative difference of the false displacement after 10 s, {law[-1]:.4f} m, from g sin(tilt) t^2 / 2, "
@@ -144,11 +146,11 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
     for i, height in enumerate((*HEIGHTS, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
-            array = sensor_array(tilted(height, np.eye(3)), formula)
-            noise = normal(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
-            alpha = angular_acceleration(spin(array, noise), np.zeros((count, 3)))
-            axis = int(np.argmax(array.gains()))
-            law, variance = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
+            array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
+            noise = normal_samples(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((count, 3)))
+            axis = int(np.argmax(array.noise_gains()))
+            law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
             rows.append(
                 mean_square(
@@ -204,10 +206,10 @@ def _engine(engine: str, duration: float) -> list[Row]:
     readings, array = readings_of(run, p), sensor_array(RIGID)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
-    acceleration = angular_acceleration(spin(array, felt), turning)[:, 1]
-    equations = build("reference", assemble(scene), settings_of(scene, "reference"))  # eq. (38) at every state
+    acceleration = angular_acceleration(spin_from_readings(array, felt), turning)[:, 1]
+    equations = build("reference", assembly_of_scene(scene), settings_of(scene, "reference"))  # eq. (38) at every state
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
-    loose = quality(sensor_array(p.positions()), readings)
+    loose = fit_quality(sensor_array(p.positions()), readings)
     return [
         *_recovered_errors("accelerometers", engine, array, felt, run.states, None),
         *_recovered_errors("gyro", engine, array, felt, run.states, turning),
@@ -223,7 +225,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             "the engine's acceleration beside eq. (38), as in the build audit",
             "shared kernel" if engine == "reference" else "native",
         ),
-        behaves(
+        behaviour_row(
             f"motion.bracket.{engine}",
             SYSTEM,
             f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.share:.2g} "
@@ -237,7 +239,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             f"motion.rigid.{engine}",
             SYSTEM,
             f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
-            quality(array, felt).share,
+            fit_quality(array, felt).share,
             "",
         ).at_most(BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
@@ -253,7 +255,9 @@ def _recovered_errors(
 ) -> list[Row]:
     """Rows: errors of pitch and heave recovered from noise-free readings of a run, with or without its gyro, relative
     to its states (n, 8)."""
-    followed = motion(array, specific_forces, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
+    followed = recovered_motion(
+        array, specific_forces, 1e-3, StartState.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates
+    )
     errors = (
         ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
         ("heave", followed.position[:, 2] - states[:, 2], "m", 1e-5),
@@ -276,24 +280,30 @@ def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     t = PERIOD * np.arange(count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
-    array = sensor_array(ARRAYS["5, one 1 m up"])
-    return rates, array, np.einsum("nij,sj->nsi", skew(alpha) + skew(rates) @ skew(rates), array.positions)
+    array = sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
+    return (
+        rates,
+        array,
+        np.einsum("nij,sj->nsi", skew_matrix(alpha) + skew_matrix(rates) @ skew_matrix(rates), array.positions),
+    )
 
 
 def _noise(path: int, count: int) -> np.ndarray:
-    return NOISE * normal(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+    return NOISE * normal_samples(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
 
 
 def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Row and curves: if rates are only integrated, their error grows with the square root of time."""
-    count, array = 6001, sensor_array(ARRAYS["5, one 1 m up"])
-    errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
+    count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
+    errors = np.array(
+        [integrate_rates(spin_from_readings(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)]
+    )
     row = mean_square(
         Observed(
             "motion.walk",
             SYSTEM,
             "ratio of the rate error's mean square to its gain after 60 s of integration alone",
-            float(np.mean((errors[:, -1] / array.gains()) ** 2)),
+            float(np.mean((errors[:, -1] / array.noise_gains()) ** 2)),
             "m^2/s^2",
         ),
         NOISE**2 * PERIOD * (count - 1) * PERIOD,
@@ -303,7 +313,7 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     curves = {
         "time": PERIOD * np.arange(count),
         "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
-        "law": NOISE * rms(array.gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
+        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
     }
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
@@ -313,12 +323,13 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
     filtered = [
-        filter_rates(spin(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE) for path in range(paths)
+        filter_rates(spin_from_readings(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE)
+        for path in range(paths)
     ]
     squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * rms(array.gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
+    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
@@ -335,7 +346,7 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
             SYSTEM,
             "ratio of the rate error with the symmetric part as a measurement to the standard "
             "deviation that the filter states",
-            late / rms(stated[-count // 3 :]),
+            late / root_mean_square(stated[-count // 3 :]),
             "",
         ).within(1.0, 0.5 if quick else 0.2, f"{why}; it neglects that the readings are used twice", "closed form"),
     ]
@@ -365,13 +376,13 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     heights = np.geomspace(0.02, 1.2, 40)
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
-        arrays = [sensor_array(tilted(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
-        left.loglog(heights, [array.gains().max() for array in arrays], label=label)
+        arrays = [sensor_array(tilted_sensors(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
+        left.loglog(heights, [array.noise_gains().max() for array in arrays], label=label)
     height, _, spatial, _, plane = zip(*(line for line in data["gains"] if len(line) == 5), strict=True)
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)
@@ -390,5 +401,5 @@ def draw(data: Saved) -> Drawn:
     right.set(title="Error of the angular velocity,\nrms [rad/s]", xlabel="time [s]")
     for axis in (left, right):
         axis.legend()
-    heading(figure, "What a flat arrangement of sensors costs, and what holds the rate")
+    add_heading(figure, "What a flat arrangement of sensors costs, and what holds the rate")
     return [("What a flat arrangement costs, and what holds the rate", figure)]

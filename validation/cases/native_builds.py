@@ -8,10 +8,10 @@ from models.vehicles.cut_vehicle import CutVehicle, cut
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.cars import r19, rough_car, twin
 from validation.spatial.native_builds import (
-    NATIVE,
+    NATIVE_ENGINES,
     acceleration_error,
     equations_error,
-    model,
+    hub_model,
     path_error,
     random_states,
 )
@@ -45,7 +45,7 @@ def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
             "1",
         ).at_most(1e-12, "of each coordinate's largest; rounding of stiff bushes leaves 6e-14", "native")
     ]
-    for engine in NATIVE:
+    for engine in NATIVE_ENGINES:
         rows += [
             Observed(
                 f"native_builds.accelerations_{name}_{engine}",
@@ -84,7 +84,7 @@ def _seconds(car: CutVehicle) -> list[Row]:
     forces."""
     rows = []
     for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
-        models = {route: model(engine, car, route, TIMED) for route in ("native", "compiled")}
+        models = {route: hub_model(engine, car, route, TIMED) for route in ("native", "compiled")}
         best: dict[str, float] = {}
         for _ in range(ROUNDS):
             for route, built in models.items():

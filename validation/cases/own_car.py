@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from models.multibody.numbers import Controls, Handling
-from models.own_model.car import car
+from models.own_model.car import vehicle_of_file
 from models.systems.handling.run import REFERENCE, build, drive_run
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.car_energy import energies_apart
@@ -26,7 +26,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Quick: 0.5 s of the lane change; in full 1.5 s."""
     path = folder / "saloon.xml"
     path.write_text(SALOON, encoding="utf-8")
-    handling = Handling(car(path), controls=CONTROLS)
+    handling = Handling(vehicle_of_file(path), controls=CONTROLS)
     return [_energy(handling, quick), *_lane_change(handling, 0.5 if quick else 1.5)], {}
 
 

@@ -22,8 +22,8 @@ from validation.faults import (
     wheelset,
     written,
 )
-from validation.faults.campaign import SYSTEM
-from validation.faults.planting import CLEAN, DESCRIPTION_FAULTS, EQUATIONS_FAULTS
+from validation.faults.campaign import FAULT_SYSTEM
+from validation.faults.planting import CONTROLS_WITHOUT_FAULT, DESCRIPTION_FAULTS, EQUATIONS_FAULTS
 
 TITLE = "Planted faults: what each check sees"
 CAMPAIGNS = (
@@ -47,7 +47,11 @@ QUICK_SPACING, FEWEST_FAULTS = 16, 40
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows on planted faults by system and, in full, over all systems; quick: every sixteenth fault of each system."""
-    plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
+    plane = (
+        pitch_plane.measure(FEW, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
+        if quick
+        else pitch_plane.measure()
+    )
     data: Saved = {
         "pitch-plane": plane,
         **{campaign.id: campaign.measure(QUICK_SPACING if quick else 1) for campaign in CAMPAIGNS},
@@ -60,7 +64,7 @@ def _row_of_fault_count(data: Saved) -> Row:
     caught = sum(line[3] != "none" for line in _lines(data))
     return Observed(
         "planted.count",
-        SYSTEM,
+        FAULT_SYSTEM,
         f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
         max(0, FEWEST_FAULTS - caught),
         "faults",

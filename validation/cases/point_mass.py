@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drift.point_mass import continuous, discrete, paths
+from models.drift.point_mass import continuous_covariance, euler_covariance, monte_carlo_errors
 from validation.common.bands import mean_square
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 
@@ -103,7 +103,7 @@ def _continuous_error(damped: float) -> float:
             [Decimal(0)] * 4,
         ]
         truth = [row[3] for row in _exponential(rates)]
-        return _largest_relative_error(continuous(TIME, DEVIATION, STEP, MASS, eta), truth)
+        return _largest_relative_error(continuous_covariance(TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
 def _discrete_error(damped: float, steps: int) -> float:
@@ -121,7 +121,7 @@ def _discrete_error(damped: float, steps: int) -> float:
             [Decimal(0)] * 3 + [Decimal(1)],
         ]
         truth = [row[3] for row in _power(recursion, steps)]
-        return _largest_relative_error(discrete(steps, DEVIATION, step, MASS, eta), truth)
+        return _largest_relative_error(euler_covariance(steps, DEVIATION, step, MASS, eta), truth)
 
 
 def _largest_relative_error(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
@@ -135,7 +135,7 @@ def _difference(damped: float, steps: int) -> float:
     """1 - ratio of the discrete to the continuous variance of the position."""
     step = TIME / steps
     arguments = (DEVIATION, step, MASS, damped / TIME)
-    return 1 - float(discrete(steps, *arguments)[0, 0] / continuous(TIME, *arguments)[0, 0])
+    return 1 - float(euler_covariance(steps, *arguments)[0, 0] / continuous_covariance(TIME, *arguments)[0, 0])
 
 
 def _monte_carlo(damped: float, count: int) -> list[Row]:
@@ -143,7 +143,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     inverse covariance of the law."""
     steps = 1000
     arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
-    law, drawn = discrete(steps, *arguments), paths(count, steps, *arguments, seed=SEED)
+    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
     why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
@@ -187,14 +187,14 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
-        exact = [continuous(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
+        exact = [continuous_covariance(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
         whole = np.unique(np.geomspace(10, 1e5, 13).astype(int))
-        euler = [discrete(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
+        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
         axes[0].loglog(whole * STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
@@ -205,6 +205,6 @@ def draw(data: Saved) -> Drawn:
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
     axes[1].set(title="Euler scheme against its limit [-]", xlabel="steps n [-]")
     axes[1].legend()
-    heading(figure, "A point mass under white force noise, 32 N at 1 kHz on 780 kg: Euler steps and their limit")
+    add_heading(figure, "A point mass under white force noise, 32 N at 1 kHz on 780 kg: Euler steps and their limit")
     caption = "Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n)."
     return [(caption, figure)]

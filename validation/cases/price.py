@@ -13,13 +13,13 @@ from pathlib import Path
 from models.advice.price import runner
 from models.advice.price.problem import Problem, Setting
 from models.engines.assembly import Assembly
-from models.ensemble.workers import processes
-from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves, not_run
+from models.ensemble.workers import process_pool
+from models.systems.pitch_plane.scene import assembly_of_scene
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row, not_run
 from validation.common.scenes import on_paper_road
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure
-from validation.price.force_calls import counted
+from validation.price.force_calls import counted_calls
 from validation.price.problems import (
     braking_stop,
     contact_alone,
@@ -88,7 +88,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _beside(quick: bool, rounds: int) -> CaseAnswer:
     """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
     claims about speed."""
-    road = assemble(road_excited.scene())
+    road = assembly_of_scene(road_excited.scene())
     rows, prices = ride.measure(quick, rounds, SHORTEST_TURN[True])
     twice, least, duration = 2 * rounds, 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
@@ -111,7 +111,7 @@ def _priced(quick: bool, rounds: int, make_problem: Make) -> CaseAnswer:
 def _in_processes(rounds: int) -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
     the road, which takes long, is started before."""
-    with processes(min(2, os.cpu_count() or 1)) as pool:
+    with process_pool(min(2, os.cpu_count() or 1)) as pool:
         first, *others = PROBLEMS + FULL_ONLY
         road, beside = pool.submit(_priced, False, rounds, first), pool.submit(_beside, False, rounds)
         priced = [*pool.map(partial(_priced, False, rounds), others[::-1])][::-1]
@@ -121,9 +121,9 @@ def _in_processes(rounds: int) -> tuple[list[CaseAnswer], CaseAnswer]:
 def _road_rows(saved_rows: Saved) -> list[Row]:
     """Rows: curves that must coincide on the road, and methods that Exudyn names without having them."""
     road = runner.of_saved(saved_rows)
-    groups = [" = ".join(sorted(group)) for group in road.same()]
+    groups = [" = ".join(sorted(group)) for group in road.coinciding_curves()]
     rows = [
-        behaves(
+        behaviour_row(
             f"price.road.coincide.{name}",
             SYSTEM,
             "work-precision curves that agree to 1 % at every common setting",
@@ -135,7 +135,7 @@ def _road_rows(saved_rows: Saved) -> list[Row]:
         for name, (group, why) in COINCIDING_CURVES.items()
     ]
     return rows + [
-        behaves(
+        behaviour_row(
             "price.road.status.DVERK6",
             SYSTEM,
             "behaviour of the solver DVERK6 in Exudyn",
@@ -158,7 +158,7 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted(engine, assembly, road_excited.settings_of(each, COUNTED_DURATION))
+            counted_calls(engine, assembly, road_excited.settings_of(each, COUNTED_DURATION))
             for each in settings
             if each.engine == engine
         ]

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from models.core.tables import write_table
-from models.identification.bands import bands, error_model
+from models.identification.bands import error_bands, error_model
 from models.identification.fit import fit
-from models.identification.held_out import Identified, Search, identified
+from models.identification.held_out import Identified, Search, identified_vehicle
 from models.identification.of_scene import problem_of
 from models.identification.problem import FitClock, Problem
 from models.identification.uncertainty import Uncertainty, uncertainty
 from models.measured.drive import read_drive
-from models.systems.single_track.race_file import PARAMETERS, RACE_CAR, plain
+from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
 from validation.common.rows import Observed, Row, System, not_run
@@ -123,24 +123,24 @@ def _coverage(fits: list[Uncertainty]) -> float:
         pairs = zip(predicted, problem.channels, strict=True)
         errors = [error_model(row - channel.values, row) for row, channel in pairs]
         fresh = replace(problem, channels=other.fit.problem.channels)
-        shares.append(bands(fresh, known, errors).inside())
+        shares.append(error_bands(fresh, known, errors).share_inside())
     return float(np.mean(shares, axis=0).min())
 
 
 def _race(file: Path, folder: Path) -> Identified:
-    path = plain(file, folder / "race.csv")
+    path = write_plain_table(file, folder / "race.csv")
     table = {"title": "race car", "system": "single-track", **RACE_CAR, "drive": {"file": path.name, "low_pass": 10.0}}
     times = read_drive(path).times
     middle = float(times[round(SHARE * len(times))])
     scenes = []
     for ends in ([float(times[0]), middle], [middle, float(times[-1])]):
         scenes.append(build({**table, "drive": {**table["drive"], "stretch": ends}}, "race car", path.parent))  # type: ignore[dict-item]
-    return identified(scenes[0], scenes[1], Search(PARAMETERS, list(AIMS), 5.0))
+    return identified_vehicle(scenes[0], scenes[1], Search(IDENTIFIED_PARAMETERS, list(AIMS), 5.0))
 
 
 def _race_rows(identified: Identified) -> list[Row]:
     answer, rows = identified.bands, []
-    figures = zip(AIMS.items(), answer.relative(), answer.inside(), answer.width(), strict=True)
+    figures = zip(AIMS.items(), answer.relative_error(), answer.share_inside(), answer.width(), strict=True)
     for (name, aim), error, inside, width in figures:
         id = f"race_car.{name.replace(' ', '_')}"
         rows += [
@@ -186,9 +186,9 @@ def _not_run(reason: str) -> list[Row]:
 
 
 def _saved(identified: Identified) -> dict[str, Any]:
-    known = identified.known
+    known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
         "standard errors": [None if np.isnan(each) else float(each) for each in known.deviations],
-        "errors": dict(zip(AIMS, identified.bands.relative().tolist(), strict=True)),
+        "errors": dict(zip(AIMS, identified.bands.relative_error().tolist(), strict=True)),
     }

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.price import unseen_systems
 from validation.price.unseen import ENGINES, Verdict, drawn, judge
@@ -33,7 +33,9 @@ LEAST_MET_SHARE, SECONDS_FACTOR = 0.95, 3.0
 error."""
 
 
-@allowing("random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same")
+@allowing_breaches(
+    "random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same"
+)
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
     both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
@@ -65,7 +67,7 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
             told = (
                 judge(drawn(n, folder), engines)
                 if system == "pitch-plane"
-                else unseen_systems.judge(unseen_systems.drawn(system, n))
+                else unseen_systems.judge(unseen_systems.drawn_scene_of_system(system, n))
             )
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
@@ -166,7 +168,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
-    from models.drawing.figures import BAD, COLOURS, DARK, LABELS, heading, subplots
+    from models.drawing.figures import COLOURS, DARK, LABELS, REJECTED_COLOUR, add_heading, subplots
 
     figure, ax = subplots(figsize=(6.0, 4.6))
     every = [verdict for of_engine in data["verdicts"] for verdict in of_engine]
@@ -192,7 +194,7 @@ def draw(data: Saved) -> Drawn:
         linewidth=0,
         label=f"within a factor {SECONDS_FACTOR:g}",
     )
-    ax.axvline(1.0, color=BAD, linewidth=1.0, label="tolerance")
+    ax.axvline(1.0, color=REJECTED_COLOUR, linewidth=1.0, label="tolerance")
     ax.set(
         xscale="log",
         yscale="log",
@@ -202,5 +204,7 @@ def draw(data: Saved) -> Drawn:
         ylim=span,
     )
     ax.legend(loc="upper left")
-    heading(figure, f"Settings recommended for scenes never seen ({len(data['verdicts'])}): errors predicted and true")
+    add_heading(
+        figure, f"Settings recommended for scenes never seen ({len(data['verdicts'])}): errors predicted and true"
+    )
     return [("Errors of recommended settings: predicted by the search, and true by another solver.", figure)]

@@ -12,21 +12,29 @@ from typing import Any
 import numpy as np
 
 from models.ride.closed_forms import half_car_acceleration, split_half_car
-from models.ride.covariance import stationary
-from models.ride.excited import excited
-from models.ride.frequency import quadrature
-from models.ride.sweep import sweep
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
+from models.ride.frequency import variances_by_quadrature
+from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.road.shape_filter import ShapeFilter
-from models.road.two_track import CASES, TwoTrackRoad, input_covariance, road_of_level
+from models.road.two_track import CORRELATION_CASES, TwoTrackRoad, input_covariance, road_of_level
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.ride.no_variance import CORNER, weighting_rows, without_variance
-from validation.ride.rides import INTENSITY, corners, five_cases, off, one_track, paper_road, twin
+from validation.ride.rides import (
+    ROAD_INTENSITY,
+    changed_vehicle,
+    five_cases,
+    largest_relative_error,
+    one_track,
+    paper_road,
+    quarter_car_vehicle,
+)
 
 TITLE = "Ride: stationary covariance with exact delays"
 SYSTEM: System = "ride"
@@ -54,7 +62,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 @cache
 def _vehicle(name: str, seed: int = 0) -> SpatialVehicle:
     vehicle = load_vehicle(name)
-    return twin(vehicle, seed) if seed else vehicle
+    return changed_vehicle(vehicle, seed) if seed else vehicle
 
 
 def _jobs(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
@@ -100,9 +108,12 @@ def _compared(
 ) -> tuple[float, float, float, int]:
     """Largest relative difference between a vehicle's covariance and quadrature on the analytic vehicle, the error that
     each route states, and the number of outputs that do not vanish by symmetry."""
-    covariance, integrals = stationary(excited(vehicle, road, speed)), quadrature(analytic, road, speed)
+    covariance, integrals = (
+        stationary_covariance(vehicle_with_road(vehicle, road, speed)),
+        variances_by_quadrature(analytic, road, speed),
+    )
     told = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
-    worst = off(covariance.deviation[told], np.sqrt(integrals.variance[told]))
+    worst = largest_relative_error(covariance.deviation[told], np.sqrt(integrals.variance[told]))
     return worst, covariance.error[told].max(), integrals.error[told].max(), int(told.sum())
 
 
@@ -110,11 +121,13 @@ def _closed_rows() -> list[Row]:
     """Rows: quarter car and half car compared with closed formulas."""
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
-        variance = stationary(excited(corners([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)).variance
-        q, w = 20.0 * INTENSITY, 20.0 * corner
+        variance = stationary_covariance(
+            vehicle_with_road(quarter_car_vehicle([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)
+        ).variance
+        q, w = 20.0 * ROAD_INTENSITY, 20.0 * corner
         exact = [CORNER.body_acceleration(q, w), CORNER.suspension_travel(q, w), CORNER.tyre_deflection(q)]
         for key, value, expected in zip(worst, variance[:3], exact if corner == 0.0 else exact[:2], strict=False):
-            worst[key] = max(worst[key], off(value, expected))
+            worst[key] = max(worst[key], largest_relative_error(value, expected))
     rows = [
         Observed(
             f"ride_covariance.quarter.{key}",
@@ -127,11 +140,11 @@ def _closed_rows() -> list[Row]:
     ]
     a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
     front, rear, inertia = split_half_car(CORNER, a, b)
-    vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
-    half = [stationary(excited(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
-    formula = [half_car_acceleration(CORNER, v * INTENSITY, a, b, v) for v in speeds]
+    vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
+    half = [stationary_covariance(vehicle_with_road(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
+    formula = [half_car_acceleration(CORNER, v * ROAD_INTENSITY, a, b, v) for v in speeds]
     what = "error of the variance at the centre of a half car that splits into quarter cars, delay exact, 3 to 50 m/s"
-    worst_half = off(np.array(half), np.array(formula))
+    worst_half = largest_relative_error(np.array(half), np.array(formula))
     return [
         *rows,
         Observed("ride_covariance.half", SYSTEM, what, worst_half, "").at_most(1e-10, "asked", "closed form"),
@@ -157,24 +170,24 @@ def _limit_rows() -> list[Row]:
     """Rows: limits of zero and infinite delay between the axles, and covariances of the road itself."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road = paper_road(vehicle.wheels)
-    lagged = excited(vehicle, road, 20.0)
-    at_once = stationary(replace(lagged, delays=(0.0,) * 3)).deviation
-    joined = stationary(replace(lagged, B=(sum(lagged.B),), D=(sum(lagged.D),), delays=(0.0,))).deviation  # type: ignore[arg-type]
-    late = stationary(replace(lagged, delays=(0.0, 1e6, 2e6))).deviation
-    apart = stationary(replace(lagged, independent=True)).deviation
+    lagged = vehicle_with_road(vehicle, road, 20.0)
+    at_once = stationary_covariance(replace(lagged, delays=(0.0,) * 3)).deviation
+    joined = stationary_covariance(replace(lagged, B=(sum(lagged.B),), D=(sum(lagged.D),), delays=(0.0,))).deviation  # type: ignore[arg-type]
+    late = stationary_covariance(replace(lagged, delays=(0.0, 1e6, 2e6))).deviation
+    apart = stationary_covariance(replace(lagged, independent=True)).deviation
     return [
         Observed(
             "ride_covariance.delay.zero",
             SYSTEM,
             "difference of three axles at delay 0 from a single input, worst output",
-            off(at_once, joined),
+            largest_relative_error(at_once, joined),
             "",
         ).at_most(0.0, "exact: they are the same equation", "closed form"),
         Observed(
             "ride_covariance.delay.long",
             SYSTEM,
             "difference of axles at delays of 1e6 s from independent axles, worst output",
-            off(late, apart),
+            largest_relative_error(late, apart),
             "",
         ).at_most(1e-14, "exact but for rounding: the response has died out", "closed form"),
         _inputs_row(),
@@ -185,9 +198,9 @@ def _inputs_row() -> Row:
     """Row: covariance of the road heights under the wheels, as the system's outputs state it."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
-    for met, case in zip(five_cases(vehicle.wheels, road).values(), CASES.values(), strict=True):
+    for met, case in zip(five_cases(vehicle.wheels, road).values(), CORRELATION_CASES.values(), strict=True):
         H = np.hstack([np.zeros((len(vehicle.wheels), 2 * len(vehicle.mass))), *met.heights])
-        heights = H @ stationary(excited(vehicle, met, 13.0)).P @ H.T
+        heights = H @ stationary_covariance(vehicle_with_road(vehicle, met, 13.0)).P @ H.T
         expected = input_covariance(road, vehicle.wheels, *case)
         worst = max(worst, float(np.abs(heights - expected).max() / np.abs(expected).max()))
     return Observed(
@@ -225,12 +238,12 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     vehicle = _vehicle("r19_ride")
     linear = linear_vehicle(vehicle, source)
     roads = five_cases(linear(20.0).wheels)
-    sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
+    variance_sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
-    quick = sweep(linear, roads, speeds, FILTERS)
+    quick = variance_sweep(linear, roads, speeds, FILTERS)
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
-    slow = sweep(linear, roads, speeds[some], FILTERS, fast=False)
+    slow = variance_sweep(linear, roads, speeds[some], FILTERS, fast=False)
     told = slow.variance > SYMMETRY_ZERO * slow.variance.max()
     rows = [
         Observed(
@@ -238,14 +251,14 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             SYSTEM,
             "difference of the variances by the fast route from the direct route, three weighted "
             "seats, worst of all outputs",
-            off(quick.variance[:, some][told], slow.variance[told]),
+            largest_relative_error(quick.variance[:, some][told], slow.variance[told]),
             "",
         ).at_most(1e-10, "asked", "none"),
-        behaves(
+        behaviour_row(
             "ride_covariance.fast.taken",
             SYSTEM,
             "points of the sweep that had to go the direct way",
-            str(sum(quick.direct.values())),
+            str(sum(quick.direct_counts.values())),
             "0",
             "its eigenvectors are well apart",
         ),
@@ -293,19 +306,19 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     shown = data["figure"]
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
     for axis, place in zip(axes, BODY_POINTS, strict=True):
         for i, case in enumerate(shown["cases"]):
-            words = "left/right {}, front/rear {}".format(*CASES[int(case)])
+            words = "left/right {}, front/rear {}".format(*CORRELATION_CASES[int(case)])
             axis.plot(shown["speeds"], shown[place][i], label=f"{case}: {words}")
         axis.set(title=place, xlabel="speed [m/s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
     legend_below(figure, axes[0], columns=2)
-    heading(figure, "Which roads belong together matters most at the centre of the body")
+    add_heading(figure, "Which roads belong together matters most at the centre of the body")
     return [(FIGURE_TEXT, figure)]
 
 

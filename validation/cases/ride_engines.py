@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
@@ -15,8 +15,8 @@ from models.vehicles.linear_vehicle import LinearVehicle, OutputRows, poles, shi
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.ride.rides import R19_FREQUENCIES, off
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.ride.rides import R19_FREQUENCIES, largest_relative_error
 from validation.spatial import spatial_twin
 
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"
@@ -88,7 +88,7 @@ def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.nda
     """Random state with standard deviations of 0.05 m or rad for coordinates and 0.5 per s for rates, and a random road
     with 0.05 m and m/s."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
-    drawn = normal(SEED, path, 1, 2 * n + 2 * w)[0]
+    drawn = normal_samples(SEED, path, 1, 2 * n + 2 * w)[0]
     return 0.05 * drawn[:n], 0.5 * drawn[n : 2 * n], 0.05 * drawn[2 * n :]
 
 
@@ -112,7 +112,9 @@ def _frequencies() -> list[Row]:
             f"ride_engines.frequencies.{engine}",
             SYSTEM,
             f"difference of the 19 eigenfrequencies of R19-ride in {engine} from the published ones",
-            off(np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES),
+            largest_relative_error(
+                np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES
+            ),
             "relative",
         ).at_most(1e-5, "six decimals of the expected ones are known", "published")
         for engine in ENGINES
@@ -153,7 +155,7 @@ def _path() -> tuple[list[Row], list[list[str]]]:
     for what in ("linear", "curved"):
         vehicle = of_name("r19_ride", GRAVITY)
         vehicle = curved(vehicle) if what == "curved" else vehicle
-        road = 1e-4 * np.cumsum(normal(SEED, 0, 2 * round(1.0 / STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
+        road = 1e-4 * np.cumsum(normal_samples(SEED, 0, 2 * round(1.0 / STEP) + 1, 2 * len(vehicle.tyres)), axis=0)
         runs = {}
         for engine in ENGINES:
             model = build(engine, vehicle, _settings(engine), None, road)
@@ -233,7 +235,7 @@ def _without_curves() -> list[Row]:
     plain, bent = (build("exudyn", vehicle).plan() for vehicle in (of_name("r19_ride"), curved(of_name("r19_ride"))))
     counts = f"{plain['curves']} curves, {bent['callbacks'] - plain['callbacks']} functions more with curves"
     return [
-        behaves(
+        behaviour_row(
             "ride_engines.curves",
             SYSTEM,
             "number of times that R19-ride runs the code of spring curves",

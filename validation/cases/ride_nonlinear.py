@@ -8,15 +8,23 @@ from typing import Any
 import numpy as np
 from scipy.integrate import quad
 
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time
-from models.ride.statistical_linearisation import promised, statistically_linear
+from models.ride.statistical_linearisation import promised_error, statistically_linear
 from models.vehicles.spatial_linear import linearise
 from validation.common.rows import Observed, Row, System, Table
-from validation.ride.in_engines import NONLINEAR, SEED, SPEED, bent_in_engines, draw, linear_in_engines, ride
-from validation.ride.rides import off
+from validation.ride.in_engines import (
+    NONLINEAR_VEHICLE,
+    SEED,
+    SPEED,
+    bent_in_engines,
+    draw,
+    linear_in_engines,
+    vehicle_and_road,
+)
+from validation.ride.rides import largest_relative_error
 
 __all__ = ["draw", "measure", "tables"]
 TITLE = "Nonlinear ride: statistical linearisation, Monte Carlo beside it, both engines in time"
@@ -48,7 +56,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _gains() -> list[Row]:
     """Rows: gains by closed forms compared with their defining integrals, for spring laws from a single corner to
     nearly straight ones."""
-    spring = ride(NONLINEAR)[0].springs[0]
+    spring = vehicle_and_road(NONLINEAR_VEHICLE)[0].springs[0]
     worst, dry = 0.0, 0.0
     for curve, mean, size in ((spring.rate_force, 0.0, 0.3), (spring.travel_force, 0.01, 0.02)):
         assert curve is not None
@@ -104,17 +112,19 @@ def expected(law: Any, cuts: Any) -> float:
 def _fixed_point() -> list[Row]:
     """Rows: statistical linearisation converges, to the same gains from another start; gravity has no effect on a
     vehicle that only moves vertically."""
-    vehicle, road = ride(NONLINEAR, 4.0)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
     first, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
-    apart = [off(each.covariance.deviation, first.covariance.deviation) for each in (other, unloaded)]
+    apart = [
+        largest_relative_error(each.covariance.deviation, first.covariance.deviation) for each in (other, unloaded)
+    ]
     return [
         Observed(
             "ride_nonlinear.fixed_point",
             SYSTEM,
-            f"relative distance of the gains from the fixed point after {len(first.changes)} "
+            f"relative distance of the gains from the fixed point after {len(first.gain_changes)} "
             f"iterations, each change at most {first.contraction:.2g} of the last",
-            first.distance,
+            first.fixed_point_distance,
             "",
         ).at_most(1e-11, "last change * c / (1 - c), Banach's bound", "none"),
         Observed(
@@ -137,7 +147,7 @@ def _fixed_point() -> list[Row]:
 def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Rows at one road level: deviations and mean travel by statistical linearisation, compared with Monte Carlo. The
     tolerance of each is the accuracy that the result's sentences state."""
-    vehicle, road = ride(NONLINEAR, level)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, level)
     linear = statistically_linear(vehicle, road, SPEED)
     copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
     rows, cells = [], [f"{level:g}"]
@@ -156,7 +166,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
                 abs(error),
                 "",
             ).at_most(
-                promised(linear.left_out[i]) + 4.0 * spread,
+                promised_error(linear.left_out[i]) + 4.0 * spread,
                 f"left out {100 * linear.left_out[i]:.2g} % of the variance: what its sentence promises, "
                 "and 4 standard errors",
                 "none",
@@ -174,7 +184,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
             abs(shift),
             "",
         ).at_most(
-            promised(linear.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
+            promised_error(linear.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
             "as above: the damper pulls the body down",
             "none",
         )
@@ -184,8 +194,8 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
 
 def _linear_copies() -> Row:
     """Row: without nonlinear springs, the variances of the Monte Carlo copies agree with the covariance."""
-    vehicle, road = ride("quarter_car")
-    exact = stationary(excited(linearise(vehicle), road, SPEED))
+    vehicle, road = vehicle_and_road("quarter_car")
+    exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
     copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)
     return Observed(
         "ride_nonlinear.linear",
@@ -198,7 +208,7 @@ def _linear_copies() -> Row:
 
 def _alone() -> list[Row]:
     """Rows: each nonlinear law alone, at the road level at which statistical linearisation is least accurate."""
-    vehicle, _ = ride(NONLINEAR)
+    vehicle, _ = vehicle_and_road(NONLINEAR_VEHICLE)
     spring = vehicle.springs[0]
     others: dict[str, tuple[float, dict[str, Any]]] = {
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
@@ -211,11 +221,11 @@ def _alone() -> list[Row]:
     rows = []
     for name, (level, laws) in others.items():
         alone = replace(vehicle, springs=(replace(spring, **laws),))
-        road = ride(NONLINEAR, level)[1]
+        road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
         copies = copies_in_time(alone, road, SPEED, LASTING[1], copies=COPIES[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
-        kept = [promised(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
+        kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / kept).argmax())
         rows.append(
             Observed(
@@ -236,7 +246,7 @@ def _alone() -> list[Row]:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Table of the errors of statistical linearisation."""
-    names = [output.name for output in ride(NONLINEAR)[0].outputs]
+    names = [output.name for output in vehicle_and_road(NONLINEAR_VEHICLE)[0].outputs]
     note = (
         "Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "
         "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper."

@@ -7,19 +7,26 @@ from typing import Any
 import numpy as np
 from scipy.integrate import quad
 
-from models.ride.covariance import stationary
-from models.ride.excited import DelayedSystem, excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import both_sides, output_densities, variances
-from models.ride.weighting import WEIGHTINGS, weighted
+from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import Excitation
 from models.road.isotropic import DensityPart, IsotropicRoad, cross_spectrum_of, isotropic_like, spectral_matrix
-from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, input_covariance, road_of_level
+from models.road.two_track import (
+    CORRELATION_CASES,
+    TRACK_DENSITY_LEVEL,
+    TwoTrackRoad,
+    input_covariance,
+    road_excitation,
+    road_of_level,
+)
 from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Observed, Row, System, Table
-from validation.ride.fitted_roads import HALF_TRACK, coherency_figure, fits_table, made, measured
-from validation.ride.rides import STANDARD, off
+from validation.ride.fitted_roads import HALF_TRACK, coherency_figure, fits_table, fitted_made_road, measured_road_rows
+from validation.ride.rides import STANDARD_WEIGHTINGS, largest_relative_error
 
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
@@ -42,8 +49,8 @@ MISPRINT = 10.0
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Closed forms by other routes, the weightings, and fits to a made road; in full also to measured roads."""
     rows = [*_paper_rows(), *_input_rows(), *_isotropic_rows(), *_weighting_rows()]
-    of_made, road = made(1_000.0 if quick else 20_000.0)
-    of_measured, roads = ([], []) if quick else measured()
+    of_made, road = fitted_made_road(1_000.0 if quick else 20_000.0)
+    of_measured, roads = ([], []) if quick else measured_road_rows()
     return [*rows, *of_made, *of_measured], {"made": road, "measured": roads}
 
 
@@ -61,7 +68,7 @@ def _paper_rows() -> list[Row]:
             "ride_road.level",
             SYSTEM,
             "relative difference of the track spectrum at 10,000 rad/m, times Omega^2, from S0",
-            spectrum / LEVEL - 1.0,
+            spectrum / TRACK_DENSITY_LEVEL - 1.0,
             "",
         ).at_most(1e-7, "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8", "closed form"),
         Observed(
@@ -87,8 +94,8 @@ def _input_rows() -> list[Row]:
     worst = {"first": 0.0, "second": 0.0}
     for order, cutoff in (("first", None), ("second", 40.0)):
         road = road_of_level(HALF_TRACK, cutoff=cutoff)
-        for case in CASES.values():
-            by_noise = heights_covariance(excitation(road, WHEELS, *case))
+        for case in CORRELATION_CASES.values():
+            by_noise = heights_covariance(road_excitation(road, WHEELS, *case))
             by_output = input_covariance(road, WHEELS, *case)
             worst[order] = max(worst[order], float(np.abs(by_noise - by_output).max() / np.abs(by_output).max()))
     why = "the Lyapunov equation of six wheels with delays, against the autocovariance of the filter at the distance"
@@ -114,7 +121,7 @@ def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
     delays = tuple(length / speed for length in road.lengths)
     names = tuple(map(str, range(len(C))))
     A = np.kron(axles, speed * road.F)
-    return C @ stationary(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T
+    return C @ stationary_covariance(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T
 
 
 def _limit_row() -> Row:
@@ -124,7 +131,7 @@ def _limit_row() -> Row:
     for length, front_rear in ((0.0, "equal"), (200.0, "uncorrelated")):
         wheels = tuple(WheelPosition(w.name, -length * w.axle, w.y, w.axle) for w in WHEELS)
         delayed, limit = (
-            heights_covariance(excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
+            heights_covariance(road_excitation(road, wheels, "modelled", how)) for how in ("delayed", front_rear)
         )
         pairs.append(float(np.abs(delayed - limit).max() / np.abs(limit).max()))
     why = "no distance: one input; 200 m: independent but for exp(-0.3 times 200) = 9e-27"
@@ -153,7 +160,7 @@ def _isotropic_rows() -> list[Row]:
             SYSTEM,
             "difference of the cross density of an isotropic road, Bessel function, from the Fourier "
             "integral of R(sqrt(x^2 + d^2))",
-            off(along, closed),
+            largest_relative_error(along, closed),
             "",
         ).at_most(1e-11, "quadrature to 1e-12 of the variance, over a density that falls", "closed form"),
         Observed(
@@ -161,7 +168,7 @@ def _isotropic_rows() -> list[Row]:
             SYSTEM,
             "difference of the cross density for waviness 2.6, Bessel function of order 1.3, from "
             "the integral over the two-dimensional density",
-            off(across, hankel),
+            largest_relative_error(across, hankel),
             "",
         ).at_most(1e-9, "quadrature to 1e-12 of the density on the track", "closed form"),
         *_route_rows(road),
@@ -192,7 +199,10 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
     """Rows: frequency responses compared with the covariance on the built-in vehicle, and an isotropic road by the same
     route."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    exact = _accelerations(stationary(excited(vehicle, excitation(road, vehicle.wheels), SPEED)).deviation, vehicle)
+    exact = _accelerations(
+        stationary_covariance(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED)).deviation,
+        vehicle,
+    )
     by_frequency, isotropic = (_by_frequency(vehicle, each) for each in (road, isotropic_like(road, HALF_TRACK)))
     rows = [
         Observed(
@@ -200,7 +210,7 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
             SYSTEM,
             f"relative difference of {len(exact)} accelerations of R19-ride by the densities of the "
             "heights from the covariance",
-            off(by_frequency, exact),
+            largest_relative_error(by_frequency, exact),
             "",
         ).at_most(
             1e-6, "0.0001 to 500 rad/m; no filter and no state on one side; what lies beyond is 1e-7", "closed form"
@@ -237,7 +247,7 @@ def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) ->
 def _weighting_rows() -> list[Row]:
     """Rows: the standard's table of weightings, filters compared with their formulas, and weighted accelerations by two
     routes."""
-    frequency, wk, wd = np.array(STANDARD).T
+    frequency, wk, wd = np.array(STANDARD_WEIGHTINGS).T
     rows = []
     for name, table in (("Wk", wk), ("Wd", wd)):
         W = WEIGHTINGS[name]
@@ -258,7 +268,7 @@ def _weighting_rows() -> list[Row]:
                 f"ride_road.weighting.{name}.states",
                 SYSTEM,
                 f"relative difference of {name} as a cascade of scaled sections from the formula of its sections",
-                off(by_states, W.response(frequency)),
+                largest_relative_error(by_states, W.response(frequency)),
                 "",
             ).at_most(1e-13, "rounding", "closed form"),
         ]
@@ -279,8 +289,8 @@ def _weighted_rows() -> list[Row]:
     vehicle = linearise(load_vehicle("r19_ride"))
     road = road_of_level(HALF_TRACK)
     filters = {"left occupant": "Wk", "body centre": "Wd"}
-    system = weighted(excited(vehicle, excitation(road, vehicle.wheels), SPEED), filters)
-    deviations = stationary(system).deviation[-len(filters) :]
+    system = system_with_weightings(vehicle_with_road(vehicle, road_excitation(road, vehicle.wheels), SPEED), filters)
+    deviations = stationary_covariance(system).deviation[-len(filters) :]
     k, weight = both_sides(vehicle, *BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
     rows = []
@@ -309,7 +319,7 @@ def _inputs_table() -> Table:
     road = road_of_level(HALF_TRACK)
     some = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (2, 3), (4, 5))
     rows = []
-    for number, case in CASES.items():
+    for number, case in CORRELATION_CASES.items():
         P = input_covariance(road, WHEELS, *case)
         rows.append((f"{number}: {case[0]}, {case[1]}", *(f"{1e6 * P[i, j]:.2f}" for i, j in some)))
     heads = ("left/right, front/rear", *(f"{WHEELS[i].name} with {WHEELS[j].name}" for i, j in some))
@@ -319,7 +329,7 @@ def _inputs_table() -> Table:
 
 def _weighting_table() -> Table:
     rows = []
-    for f, wk, wd in STANDARD:
+    for f, wk, wd in STANDARD_WEIGHTINGS:
         factors = [1e3 * abs(complex(WEIGHTINGS[name].response(np.array(f)))) for name in ("Wk", "Wd")]
         rows.append((f"{f:g}", f"{factors[0]:.1f}", f"{wk:g}", f"{factors[1]:.1f}", f"{wd:g}"))
     note = "Factors times 1000; the table as others have printed it. Its Wd at 10 Hz does not fit its own parameters."

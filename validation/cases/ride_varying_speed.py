@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.ride.covariance import stationary
+from models.ride.covariance import stationary_covariance
 from models.ride.monte_carlo import at_constant_speed, variances_along_drive
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
@@ -20,8 +20,8 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.ride.rides import off, paper_road
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.ride.rides import largest_relative_error, paper_road
 
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
@@ -78,7 +78,10 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     covariance, and half the step."""
     vehicle, road = ride(name)
     system = at_speed(vehicle, road, STEADY_SPEED)
-    exact, settling = stationary(system).deviation, -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max()
+    exact, settling = (
+        stationary_covariance(system).deviation,
+        -SETTLED_RATE_TIMES_TIME / np.linalg.eigvals(system.A).real.max(),
+    )
     change = SpeedProfile((0.0, 0.5, 0.5 + settling), (STEADY_SPEED / 2.0, STEADY_SPEED, STEADY_SPEED))
     settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED))
     often = np.linspace(stops.times[0], stops.times[-1], 41)
@@ -92,14 +95,14 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
             f"ride_varying_speed.settled.{name}",
             SYSTEM,
             f"{name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov equation",
-            off(settled[-1], exact),
+            largest_relative_error(settled[-1], exact),
             "",
         ).at_most(1e-10, "the stationary limit, relative", "closed form"),
         Observed(
             f"ride_varying_speed.even.{name}",
             SYSTEM,
             f"{name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst instant",
-            off(even, exact),
+            largest_relative_error(even, exact),
             "",
         ).at_most(1e-10, "nothing may drift", "closed form"),
         Observed(
@@ -107,7 +110,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
             SYSTEM,
             f"{name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
             "each wheel, worst instant",
-            off((stopped.height / stopped.height[0]) ** 2, 1.0),
+            largest_relative_error((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
         ).at_most(1e-10, "the road does not know how fast it is driven over; relative", "closed form"),
         Observed(
@@ -130,7 +133,7 @@ def _adjoint() -> Row:
         SYSTEM,
         "half_car, a stop within its wheelbase and off again: relative difference of the body's rear "
         "acceleration from the adjoint",
-        off(varied.of("body rear")[-1], exact),
+        largest_relative_error(varied.of("body rear")[-1], exact),
         "",
     ).at_most(1e-8, "the adjoint's solver is good to 1e-10", "closed form")
 
@@ -142,7 +145,7 @@ def _damped() -> Row:
     force, moving = varied.of("tyre force front left"), varied.speed > 0.0
     said = "infinite" if np.isinf(force[moving]).all() else "finite"
     said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
-    return behaves(
+    return behaviour_row(
         "ride_varying_speed.damped",
         SYSTEM,
         "half_car with tyre damping: variance of the tyre force while driving, and at standstill",
@@ -179,7 +182,7 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
 def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
     """Rows: Monte Carlo copies at three instants, judged at three points of the body; all outputs and the error of the
     quasi-stationary solution are reported."""
-    error = off(np.array(drive["quasi"]), np.array(drive["deviation"]))
+    error = largest_relative_error(np.array(drive["quasi"]), np.array(drive["deviation"]))
     return [
         Observed(
             f"ride_varying_speed.copies.{name}",
@@ -212,8 +215,11 @@ def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
 def _constant() -> list[Row]:
     """Rows: Monte Carlo copies at constant speed, and what one more digit costs by them and by the covariance."""
     vehicle, road = ride("r19_ride")
-    exact = stationary(at_speed(vehicle, road, STEADY_SPEED))
-    fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(REPEATS)])[1] / REPEATS
+    exact = stationary_covariance(at_speed(vehicle, road, STEADY_SPEED))
+    fast = (
+        _timed(lambda: [stationary_covariance(at_speed(vehicle, road, STEADY_SPEED)) for _ in range(REPEATS)])[1]
+        / REPEATS
+    )
     copies, slow = _timed(at_constant_speed, vehicle, road, STEADY_SPEED, LASTING, copies=STEADY_COPIES, seed=SEED)
     columns = [copies.names.index(point) for point in POINTS]
     z = copies.z(exact.deviation[None])[0]
@@ -321,7 +327,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot standard deviations over time, with the quasi-stationary solution for comparison."""
     if not data:
         return []
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9), sharey=True)
     for axis, (name, drive) in zip(axes, data.items(), strict=True):
@@ -345,7 +351,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
     axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")
     axes[0].legend(fontsize=7.5)
-    heading(figure, "A drive of varying speed is no row of constant speeds")
+    add_heading(figure, "A drive of varying speed is no row of constant speeds")
     caption = (
         "Standard deviation of the body's vertical acceleration (19 freedoms, the paper's road) while the speed "
         "varies; dashed as if the momentary speed had always been driven."

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from models.road.csv_road import read_csv_road
-from models.road.iso8608 import CLASSES, iso8608_road
+from models.road.iso8608 import DENSITY_OF_CLASS, iso8608_road
 from models.road.opencrg import read_opencrg, write_opencrg
 from models.road.profile import RoadProfile
 from models.road.study import study_road
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Observed, Row, System, not_run
-from validation.common.scenes import COURSE, data_folder, gap, on_paper_road, road_scene
+from validation.common.scenes import COURSE_FILE, data_folder, largest_difference, on_paper_road, road_scene
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
@@ -63,7 +63,7 @@ def _round_trips(folder: Path) -> list[Row]:
             "roads.same-run",
             SYSTEM,
             "largest difference of the vehicle's states over the OpenCRG road from those over the CSV road",
-            gap(*paths),
+            largest_difference(*paths),
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same heights to 1e-14 through the same springs", "shared kernel")
     )
@@ -102,7 +102,7 @@ def _class_variance() -> Row:
     low, high = 0.05, 2.0
     road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]
-    expected = CLASSES["C"] * 0.1**2 * (1 / low - 1 / high)
+    expected = DENSITY_OF_CLASS["C"] * 0.1**2 * (1 / low - 1 / high)
     return Observed(
         "roads.iso8608",
         SYSTEM,
@@ -118,7 +118,7 @@ def _measured() -> list[Row]:
     data = data_folder()
     if data is None:
         return [not_run("roads.measured", SYSTEM, "measured roads", "TWINRIG_DATA names no folder")]
-    left, right = (read_opencrg(data / COURSE, track) for track in ("left", "right"))
+    left, right = (read_opencrg(data / COURSE_FILE, track) for track in ("left", "right"))
     station = np.arange(0.0, 504.0, 0.05)
     heights = [profile.height_and_slope(station)[0] for profile in (left, right)]
     undulated = heights[0][(station >= 100) & (station <= 404.8)]

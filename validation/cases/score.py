@@ -5,16 +5,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.score import CHANNELS, errors
-from models.fatigue.damage import SLOPE, pseudo_damage
+from models.drift.score import SECTION_FORCE_CHANNELS, errors_of_run
+from models.fatigue.damage import WOEHLER_SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
-from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
-from validation.common.scenes import drive, force_scene, on_paper_road
+from validation.common.grounds import allowing_breaches
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaviour_row
+from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
@@ -53,7 +53,7 @@ PROTOTYPE = {
 
 
 @on_paper_road()
-@allowing("what holds a run too softly, or too hard, is scored like all else")
+@allowing_breaches("what holds a run too softly, or too hard, is scored like all else")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
     rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
@@ -72,9 +72,9 @@ def _conventions() -> list[Row]:
     change it."""
     from rainflow import extract_cycles
 
-    walk = normal(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
-    white = normal(SEED, 1, SAMPLES, 1)[:, 0]
-    whole = sum(count * span**SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
+    walk = normal_samples(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
+    white = normal_samples(SEED, 1, SAMPLES, 1)[:, 0]
+    whole = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
     repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
@@ -108,7 +108,7 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     """Rows: in a run that sinks steadily, the heave error grows, but the section forces are right."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        drive(folder, duration)
+        virtual_drive(folder, duration)
         sunk = {engine: _sinking(engine, folder, duration) for engine in engines}
     rows = []
     for engine, (drift, worst) in sunk.items():
@@ -141,7 +141,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
     scene = force_scene(folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
     still, moved = (simulate(each, engine) for each in (scene, sinking))
-    wrong = errors(moved, still)
+    wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
 
@@ -157,7 +157,7 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
             row = _scored(bench, name, engine)
             rows.append(
-                behaves(
+                behaviour_row(
                     f"score.grade.{name.split()[0]}.{engine}",
                     SYSTEM,
                     f"{engine}: {name}, 5 s up to a grade of 0.1 rad",
@@ -189,7 +189,7 @@ def _verdicts(studied: list[Saved]) -> list[Row]:
         place = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
             id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
-            rows.append(behaves(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
+            rows.append(behaviour_row(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD:
             id, what, why = (
                 f"score.without-truth.{_id(row)}",
@@ -197,7 +197,7 @@ def _verdicts(studied: list[Saved]) -> list[Row]:
                 row["reason without truth"],
             )
             told = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(behaves(id, SYSTEM, what, told, "not accepted", why, "none"))
+            rows.append(behaviour_row(id, SYSTEM, what, told, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
             id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
             why = "what an engineer without the truth cannot know"
@@ -291,7 +291,7 @@ HEADINGS = (
     "engine",
     "road",
     "method",
-    *CHANNELS,
+    *SECTION_FORCE_CHANNELS,
     "vertical f3",
     "pitch error [rad]",
     "moment rms [N m]",
@@ -302,7 +302,7 @@ HEADINGS = (
 
 
 def _cells(row: Saved) -> tuple[str, ...]:
-    ratios = (row[f"damage {channel}"] for channel in CHANNELS)
+    ratios = (row[f"damage {channel}"] for channel in SECTION_FORCE_CHANNELS)
     return (
         row.get("engine", "reference"),
         row.get("road", "road"),
@@ -321,9 +321,9 @@ def draw(data: Saved) -> Drawn:
     """Plot the study's score of the stabilisers."""
     if not data["study"]:
         return []
-    from models.drawing.drift import decision
+    from models.drawing.drift import decision_figure
 
     scene = load(SCENE)
     options = read(Options, scene.options, "", "options")
     rows = [row for row in data["study"] if row["engine"] == "reference"]
-    return [("What each stabiliser leaves in the section forces", decision(rows, options.limits, options.grade))]
+    return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

@@ -5,22 +5,22 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble
-from models.systems.pitch_plane.virtual_measurement import Follow, follower, write_measurement
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
+from models.systems.pitch_plane.virtual_measurement import BuildFollower, follower_builder, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from models.vehicles.pitch_plane import Parameters
 from validation.common import checks
 from validation.common.checks import trajectory_gap
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, System
-from validation.common.scenes import VEHICLES, on_paper_road, road_scene
+from validation.common.scenes import VEHICLE_SETS, on_paper_road, road_scene
 
 TITLE = "Stabilisers"
 SYSTEM: System = "drift"
@@ -41,19 +41,19 @@ EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
 BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
-@allowing("masses are wrong on purpose: what they leave to be held is what is measured")
+@allowing_breaches("masses are wrong on purpose: what they leave to be held is what is measured")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
     with TemporaryDirectory() as name:
-        for parameters in VEHICLES:
+        for parameters in VEHICLE_SETS:
             scene = road_scene(parameters, STEP, duration)
             measured, work = measure_road(scene), Path(name) / parameters
             work.mkdir()
             write_measurement(measured, work, STEP)
-            follow, p = follower(scene, work), scene.vehicle_parameters()
+            follow, p = follower_builder(scene, work), scene.vehicle_parameters()
             rows += _missing_mass(parameters, p, measured, follow, work)
             rows += _shifted_centre(parameters, p, measured, follow, work)
         rows += [
@@ -77,7 +77,9 @@ def guided(scene: Scene, engine: str) -> Result:
     return simulate(scene, engine, Settings(CONSTRAINED[engine], STEP, scene.run.duration, spectral_radius=0.6))
 
 
-def _missing_mass(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
+def _missing_mass(
+    parameters: str, p: Parameters, measured_run: Result, follow: BuildFollower, folder: Path
+) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light, prescribing the heave takes a mean force of dm (g - z3'')."""
     write_motion(measured_run, folder)
     scene = follow({"m3": (1 - MISSING) * p.m3}, RAILS)
@@ -99,7 +101,9 @@ def _missing_mass(parameters: str, p: Parameters, measured_run: Result, follow: 
     ]
 
 
-def _shifted_centre(parameters: str, p: Parameters, measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
+def _shifted_centre(
+    parameters: str, p: Parameters, measured_run: Result, follow: BuildFollower, folder: Path
+) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
     write_motion(measured_run, folder, SHIFT)
@@ -118,12 +122,12 @@ def _shifted_centre(parameters: str, p: Parameters, measured_run: Result, follow
     ]
 
 
-def _dead_band_and_moment(follow: Follow, duration: float) -> list[Row]:
+def _dead_band_and_moment(follow: BuildFollower, duration: float) -> list[Row]:
     """Rows: a spring with a dead band, and an added moment, in both engines compared with the reference."""
-    assembly = assemble(follow({}, BAND))
+    assembly = assembly_of_scene(follow({}, BAND))
     times = STEP * np.arange(round(duration / STEP) + 1)
     moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
-    free = assemble(follow({}, {}))
+    free = assembly_of_scene(follow({}, {}))
     laws: dict[str, tuple[Assembly, str]] = {
         "dead_band": (assembly, "a pitch spring with a dead band of 0.01 rad"),
         "moment": (free.with_moment(moment), "an added moment of 500 N m at 30 rad/s"),
@@ -141,10 +145,10 @@ def _dead_band_and_moment(follow: Follow, duration: float) -> list[Row]:
     ]
 
 
-def _high_pass(follow: Follow) -> Row:
+def _high_pass(follow: BuildFollower) -> Row:
     """Rows on the high-pass: the slow pole of the linearised vehicle with the filter is the filter's own."""
     corner, ratio = 2 * np.pi * CUT_OFF, 0.7
-    vehicle = assemble(follow({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
+    vehicle = assembly_of_scene(follow({}, {"high_pass": {"cut_off": CUT_OFF, "damping_ratio": ratio}})).vehicle
     poles = np.linalg.eigvals(first_order(linearised(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
@@ -163,9 +167,9 @@ def _high_pass(follow: Follow) -> Row:
     )
 
 
-def _bandwidth(measured_run: Result, follow: Follow, folder: Path) -> list[Row]:
+def _bandwidth(measured_run: Result, follow: BuildFollower, folder: Path) -> list[Row]:
     """Rows: stabilising moment by a pitch with the white noise of an inertial unit, raw and smoothed."""
-    noise = SENSOR * normal(SEED, 0, len(measured_run.times), 1)[:, 0]
+    noise = SENSOR * normal_samples(SEED, 0, len(measured_run.times), 1)[:, 0]
     write_time_series(folder / "measured.csv", {"pitch": ("rad", measured_run["pitch"] + noise)}, STEP)
     file = {"file": "measured.csv"}
     runs = {

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.discretisation import WARNED
+from models.core.discretisation import WARNED_SHARE
 from models.core.systems import modules_of
-from models.ensemble.workers import processes
-from validation.common.grounds import allowing
+from models.ensemble.workers import process_pool
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.stated_errors.sample import Sample
 
@@ -35,7 +35,7 @@ EDGE = 1e-12
 """True errors below this share of their channel are rounding."""
 
 
-@allowing("what is judged is how well equations are solved, whatever a random vehicle does")
+@allowing_breaches("what is judged is how well equations are solved, whatever a random vehicle does")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
     names = list(SYSTEMS)
@@ -50,7 +50,7 @@ def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
     """Samples of each system, computed by at most two processes; by this process if there is only one system."""
     if len(counts) == 1:
         return [samples(name, count) for name, count in counts.items()]
-    with processes(min(2, os.cpu_count() or 1)) as pool:
+    with process_pool(min(2, os.cpu_count() or 1)) as pool:
         return list(pool.map(samples, counts, counts.values()))
 
 
@@ -67,7 +67,7 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "system": system,
         "name": sample.name,
         "engine": sample.engine,
-        "cost": sample.extra / sample.calls,
+        "cost": sample.extra_calls / sample.calls,
         "ratio": None,
     }
     if not sample.told:
@@ -120,7 +120,9 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
             f"samples whose true error is above {FAR:g} times the stated error, without a warning",
             float(len(silent)),
             "",
-        ).at_most(0.0, f"asked: none; a warning stands above {100 * WARNED:g} % of the channel's deviation", "none"),
+        ).at_most(
+            0.0, f"asked: none; a warning stands above {100 * WARNED_SHARE:g} % of the channel's deviation", "none"
+        ),
         Observed(
             "stated_errors.cost",
             SYSTEM,
@@ -200,18 +202,20 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Plot true error over stated error, both divided by the channel's standard deviation."""
-    from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, subplots
+    from models.drawing.figures import CURVE_COLOURS, GREY, ORANGE, REJECTED_COLOUR, add_heading, subplots
 
     figure, axis = subplots(figsize=(6.5, 5.0))
     known = [sample for sample in data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
-    for name, colour in zip(dict.fromkeys(sample["system"] for sample in known), (*TURNS, BAD), strict=False):
+    for name, colour in zip(
+        dict.fromkeys(sample["system"] for sample in known), (*CURVE_COLOURS, REJECTED_COLOUR), strict=False
+    ):
         stated = np.array([sample["share"] for sample in known if sample["system"] == name])
         ratios = np.array([sample["ratio"] for sample in known if sample["system"] == name])
         axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)
     ends = np.array([1e-16, 1.0])
     for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):
         axis.plot(ends, factor * ends, style, color=GREY, lw=0.9)
-    axis.axvspan(WARNED, 10.0, color=ORANGE, alpha=0.15, lw=0)
+    axis.axvspan(WARNED_SHARE, 10.0, color=ORANGE, alpha=0.15, lw=0)
     axis.set(
         xscale="log",
         yscale="log",
@@ -219,6 +223,6 @@ def draw(data: Saved) -> Drawn:
         ylabel="true error / deviation of the channel [-]",
     )
     axis.set_title("dashed: 3 times the stated error; dotted: 10 times and a tenth; shaded: warned")
-    heading(figure, "Errors of random scenes, true and as their results state them")
+    add_heading(figure, "Errors of random scenes, true and as their results state them")
     axis.legend(loc="upper left")
     return [("True errors of random scenes over what their results state.", figure)]

@@ -5,7 +5,7 @@ from pathlib import Path
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import CaseAnswer, Independence, Observed, System
-from validation.common.scenes import gap, on_paper_road, road_scene
+from validation.common.scenes import largest_difference, on_paper_road, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
 SYSTEM: System = "pitch-plane"
@@ -28,7 +28,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "tight.uncertainty",
             SYSTEM,
             "difference between the tight solutions by Dormand-Prince 8 and by Adams/BDF",
-            gap(tight, other),
+            largest_difference(tight, other),
             "m, rad, m/s, rad/s",
         ).at_most(1e-7, "a tenth of the bound that it has to judge", "shared kernel")
     ]
@@ -41,7 +41,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
                 f"tight.{engine}",
                 SYSTEM,
                 f"largest error of the states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
-                gap(run, tight),
+                largest_difference(run, tight),
                 "m, rad, m/s, rad/s",
             ).at_most(1e-6, "a thousandth of a millimetre: far below what a road survey resolves", independence)
         )

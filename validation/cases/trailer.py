@@ -6,13 +6,13 @@ import numpy as np
 
 from models.multibody.numbers import Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.energy import energy, unaccounted
+from models.systems.handling.energy import drive_energy, unaccounted
 from models.systems.handling.run import Drive, drive_run
 from models.vehicles.spatial import SpatialVehicle
-from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
+from validation.common.rows import CaseAnswer, Observed, Row, System, behaviour_row
 from validation.spatial.towing import circle_error, keep_to_the_car, levers_error, towed_turn
 from validation.spatial.trains import caravan, train, train_without_tie
-from validation.spatial.written_equations import TURN
+from validation.spatial.written_equations import TURN_CONTROLS
 
 TITLE = "A car with a trailer on its suspension"
 SYSTEM: System = "rolling-vehicle"
@@ -32,7 +32,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _driven(engine: str, vehicle: SpatialVehicle, duration: float) -> Drive:
     """A turn on a rough road, steered, braked and driven."""
-    return drive_run(engine, Handling(vehicle, Tyres(), TURN, plane_waves(4e-6, seed=3)), SPEED, duration)
+    return drive_run(engine, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
 
 
 def _levers_row() -> Row:
@@ -94,7 +94,7 @@ def _energy_row() -> Row:
         "trailer.ledger",
         SYSTEM,
         "error of the energy balance of a turn with the caravan, relative to its total energy",
-        float(np.abs(unaccounted(drive)).max() / energy(drive)[0]),
+        float(np.abs(unaccounted(drive)).max() / drive_energy(drive)[0]),
         "",
     ).at_most(1e-7, "Simpson's rule over springs, dampers, tyres, drag, brakes and steering", "closed form")
 
@@ -102,7 +102,7 @@ def _energy_row() -> Row:
 def _fault_row() -> Row:
     errors = towed_turn(caravan(), TURNING, keep_to_the_car)
     seen = abs(errors.yaw) > TURN_BOUND or np.abs(errors.headings).max() > TURN_BOUND
-    return behaves(
+    return behaviour_row(
         "trailer.fault",
         SYSTEM,
         "planted: wheels of the caravan keep to the car's heading, by the steady turn",

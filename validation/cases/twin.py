@@ -7,9 +7,17 @@ from models.core.result import Result
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, System, not_run
-from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, on_paper_road, road_scene
+from validation.common.scenes import (
+    COURSE_FILE,
+    VEHICLE_SETS,
+    data_folder,
+    force_scene,
+    largest_difference,
+    on_paper_road,
+    road_scene,
+)
 
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
@@ -27,7 +35,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows per road, excitation, vehicle and engine, each the worst over the steps; quick: one vehicle at one step."""
     rows: list[Row] = []
     steps = STEPS[-1:] if quick else STEPS
-    for parameters in VEHICLES[-1:] if quick else VEHICLES:
+    for parameters in VEHICLE_SETS[-1:] if quick else VEHICLE_SETS:
         rows += _compare(f"study road, {parameters}", [road_scene(parameters, step) for step in steps])
         measured = simulate(road_scene(parameters, STEPS[-1], 2.1), "reference")
         rows += _forces(parameters, "study road", measured, steps)
@@ -46,15 +54,17 @@ def _forces(parameters: str, where: str, measured_run: Result, steps: tuple[floa
         return rows
 
 
-@allowing("edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road")
-@allowing("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
+@allowing_breaches(
+    "edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road"
+)
+@allowing_breaches("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
 def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
     """Rows: runs on the measured course (250 m at 50 m/s), and runs driven by the wheel forces of its rough part."""
     data = data_folder()
-    if data is None or not (data / COURSE).exists():
+    if data is None or not (data / COURSE_FILE).exists():
         reason = "TWINRIG_DATA names no folder with the measured course"
         return [not_run(f"twin.course.{parameters}", SYSTEM, f"paths on the measured course, {parameters}", reason)]
-    road = {"source": "opencrg", "file": COURSE, "speed": 50.0, "beyond_end": "refused"}
+    road = {"source": "opencrg", "file": COURSE_FILE, "speed": 50.0, "beyond_end": "refused"}
     scenes = [road_scene(parameters, step, 5.0, road, data) for step in steps]
     measured = simulate(scenes[-1], "reference")
     rough = Result(
@@ -76,7 +86,9 @@ def _compare(title: str, scenes: list[Scene]) -> list[Row]:
             f"twin.{engine}.{title}",
             SYSTEM,
             f"largest difference of the states in {engine} from the reference, RK4 at {steps} ms, {title}",
-            max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
+            max(
+                largest_difference(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)
+            ),
             "m, rad, m/s, rad/s",
         ).at_most(BOUND, WHY, "native")
         for engine in ("exudyn", "mujoco")

@@ -4,13 +4,20 @@ from importlib import import_module
 from pathlib import Path
 
 from models.core.systems import SYSTEMS, load
-from models.own_model.builds import SOFT
-from models.own_model.certificate import ALIKE as SAME
-from models.own_model.certificate import Agreement, agreement, certificate, moved_at, reference, states_of
-from models.own_model.content import KINDS
+from models.own_model.builds import SOFT_BUILD
+from models.own_model.certificate import EQUAL_ACCELERATION_SHARE as SAME
+from models.own_model.certificate import (
+    Agreement,
+    agreement_of_build,
+    certificate,
+    moved_at,
+    reference_of_file,
+    states_of,
+)
+from models.own_model.content import CONTENT_KINDS
 from models.own_model.explain import compare
 from models.own_model.file import ModelFile, read
-from models.own_model.path import ALIKE, paths
+from models.own_model.path import EQUAL_PATH_SHARE, compare_paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.files import (
     ARM_URDF,
@@ -34,7 +41,7 @@ SOLVED = 1e-8
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 EXPORTED = ("ride", "ride_nonlinear", "handling", "hub_forces", "wheelset", "study_road", "ride_drive", "motion")
 """Scenes whose vehicle is written as MJCF by ``twinrig export`` and read again."""
-OUTSIDE = tuple(kind for kind in KINDS if kind not in ("flex", "turning_law"))
+OUTSIDE = tuple(kind for kind in CONTENT_KINDS if kind not in ("flex", "turning_law"))
 """Content that is left out of exported vehicles: springs along axes of bodies are actuators at sites there."""
 
 
@@ -87,7 +94,7 @@ def _soft(folder: Path, name: str, text: str) -> Row:
     plain equations."""
     twin = _read(folder, name, text).twin
     states = states_of(twin, QUICK_STATES)
-    apart = agreement("", reference(twin, states, SOFT), moved_at(softly_coupled(twin), states))
+    apart = agreement_of_build("", reference_of_file(twin, states, SOFT_BUILD), moved_at(softly_coupled(twin), states))
     return Observed(
         f"twin_files.soft_{name}",
         SYSTEM,
@@ -100,7 +107,7 @@ def _soft(folder: Path, name: str, text: str) -> Row:
 
 def _path(folder: Path) -> list[Row]:
     """Rows: paths of the cart over 1 s, and its balance of energy and work."""
-    report = paths(_read(folder, "cart", CART).twin)
+    report = compare_paths(_read(folder, "cart", CART).twin)
     return [
         Observed(
             "twin_files.path",
@@ -108,7 +115,7 @@ def _path(folder: Path) -> list[Row]:
             "largest difference of the states of all builds over 1 s, same tableau and step, cart",
             max(report.distances.values()),
             "of the largest",
-        ).at_most(ALIKE, "rounding; a disturbance of 1e-14 stays below it", "native"),
+        ).at_most(EQUAL_PATH_SHARE, "rounding; a disturbance of 1e-14 stays below it", "native"),
         Observed(
             "twin_files.energy",
             SYSTEM,

@@ -8,16 +8,23 @@ from typing import Any
 import numpy as np
 
 from models.rail import equations as eq
-from models.rail.eigenvalues import growth, wavelength
-from models.rail.energy import ledger
+from models.rail.eigenvalues import largest_growth, wavelength
+from models.rail.energy import energy_ledger
 from models.rail.equations import Equations
-from models.rail.limit_cycle import Orbit, attained, guess_from_orbit, refined, solved_orbit
-from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
-from models.rail.wheelset import CHOSEN, Wheelset
-from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
+from models.rail.limit_cycle import Orbit, attained_cycle, guess_from_orbit, refined_orbit, solved_orbit
+from models.rail.linear import NoCriticalSpeed, critical_speed, klingel_wavelength
+from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
+from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, implementation
 from validation.common.checks import largest_relative_difference
-from validation.common.rows import Observed, Row, System, Table, behaves
-from validation.contact.drawn_wheelsets import HEAVY_WHEELSET, SEED, STIFF_WHEELSET, Speeds, criticals, drawn_wheelsets
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
+from validation.contact.drawn_wheelsets import (
+    HEAVY_WHEELSET,
+    SEED,
+    STIFF_WHEELSET,
+    Speeds,
+    critical_speeds,
+    drawn_wheelsets,
+)
 from validation.faults import wheelset as faults
 
 TITLE = "A wheelset on straight track"
@@ -29,16 +36,16 @@ LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 """Spread of random states about rest: flanges touch, wheels lift off, creep forces saturate."""
 ABOVE = 1.1
 """Speed of paths and cycles by the critical one."""
-ENGINES = tuple(name for name in IMPLEMENTATIONS if name != "reference")
+ENGINES = tuple(name for name in IMPLEMENTATION_MODULES if name != "reference")
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the chosen wheelset alone, without the faults."""
-    wheelsets = {"chosen": CHOSEN} | ({} if quick else drawn_wheelsets())
-    speeds = {name: criticals(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
+    wheelsets = {"chosen": CHOSEN_WHEELSET} | ({} if quick else drawn_wheelsets())
+    speeds = {name: critical_speeds(wheelset, quick or name != "chosen") for name, wheelset in wheelsets.items()}
     rows = [*_wave_rows(wheelsets), *_critical_rows(speeds), *_acceleration_rows(wheelsets)]
     rows += _path_rows(wheelsets, speeds, 11 if quick else 21)
-    cycles = _cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATIONS))
+    cycles = _cycles(wheelsets, speeds, ("reference", "mujoco") if quick else tuple(IMPLEMENTATION_MODULES))
     rows += [*_cycle_rows(cycles), _order_row(), *_energy_rows()]
     if not quick:
         rows += [
@@ -66,8 +73,8 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     """Rows: wavelength of each free wheelset by closed form, with knife-edge rails, and in all implementations."""
     closed, edges, among = [], [], []
     for wheelset in wheelsets.values():
-        waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATIONS}
-        closed.append(max(abs(wave / klingel(wheelset) - 1.0) for wave in waves.values()))
+        waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
+        closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_spread(waves.values()))
         edge = wheelset.changed(head_radius=EDGE)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
@@ -102,8 +109,8 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
     """Rows: largest relative difference between the implementations' critical speeds, and whether they agree on which
     wheelsets have one."""
     there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
-    agreed = all(len(of_engine) in (0, len(IMPLEMENTATIONS)) for of_engine in there)
-    having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATIONS)]
+    agreed = all(len(of_engine) in (0, len(IMPLEMENTATION_MODULES)) for of_engine in there)
+    having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATION_MODULES)]
     why = (
         "each linearises its own equations of motion around the same contact forces, and looks for itself: at all "
         "speeds for the chosen wheelset, for drawn ones near the first's and below"
@@ -116,7 +123,7 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
             max(map(_spread, having)),
             "",
         ).at_most(1e-6, why, "shared kernel"),
-        behaves(
+        behaviour_row(
             "wheelset.critical.agreed",
             SYSTEM,
             f"which of {len(there)} wheelsets have a critical speed",
@@ -131,12 +138,12 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
 def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
     """Row: all implementations find no critical speed for a wheelset that has none."""
     said = set()
-    for engine in IMPLEMENTATIONS:
+    for engine in IMPLEMENTATION_MODULES:
         try:
-            said.add(f"{critical_speed(wheelset, partial(growth, implementation(engine))):.3g} m/s")
+            said.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
             said.add("unstable" if error.unstable else "stable")
-    return behaves(
+    return behaviour_row(
         f"wheelset.critical.{name}",
         SYSTEM,
         f"outcome of three implementations for a {name} wheelset at all speeds",
@@ -153,7 +160,7 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         worst = 0.0
         for wheelset in wheelsets.values():
             written, built = (implementation(name)(wheelset, 60.0, cells=11) for name in ("reference", engine))
-            states = written.rest + LIVELY * draw.normal(size=(20, eq.STATES))
+            states = written.rest + LIVELY * draw.normal(size=(20, eq.STATE_COUNT))
             worst = max(
                 worst, *(largest_relative_difference(built.rates(state), written.rates(state)) for state in states)
             )
@@ -185,9 +192,9 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
         paths: dict[str, Any] = {}
         setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", cells)
         step = _step(Equations(*setup))
-        for engine in IMPLEMENTATIONS:
+        for engine in IMPLEMENTATION_MODULES:
             equations = implementation(engine)(*setup)
-            paths[engine] = equations.run(equations.displaced(4e-3), DURATION, step)
+            paths[engine] = equations.run(equations.displaced_state(4e-3), DURATION, step)
             power = paths[engine].contacts["power"]
             positive, steps = positive + int((power > 0.0).sum()), steps + power.size
         for first, second in pairs:
@@ -236,11 +243,11 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
         setup: tuple[Any, ...] = (wheelset, _speed_of_path(speeds, name), "fastsim", 11)
-        first = attained(Equations(*setup), step=_step(Equations(*setup)))
+        first = attained_cycle(Equations(*setup), step=_step(Equations(*setup)))
         if first is not None:
             guesses = {engine: guess_from_orbit(first, implementation(engine)(*setup)) for engine in engines}
             cycles[name] = {
-                engine: refined(solved_orbit(guess, "amplitude", precise=False), "amplitude")
+                engine: refined_orbit(solved_orbit(guess, "amplitude", precise=False), "amplitude")
                 for engine, guess in guesses.items()
             }
     return cycles
@@ -272,8 +279,8 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
 
 def _order_row() -> Row:
     """Observed order of RK4 with linear creep, from three steps."""
-    equations = Equations(CHOSEN, 60.0, "linear")
-    start = equations.displaced(5e-3)
+    equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
+    start = equations.displaced_state(5e-3)
     ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
     return Observed(
@@ -290,10 +297,10 @@ def _energy_rows() -> list[Row]:
     creep laws."""
     rows = list[Row]()
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
-        equations = Equations(CHOSEN, 60.0, law, 11)  # type: ignore[arg-type]
+        equations = Equations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
         left = []
         for step in (STEP, STEP / 2.0, STEP / 4.0):
-            book = ledger(equations, equations.run(equations.displaced(5e-3), 0.1, step))
+            book = energy_ledger(equations, equations.run(equations.displaced_state(5e-3), 0.1, step))
             left.append(float(np.abs(book.residual).max() / book.creep[-1]))
         rows += [
             Observed(
@@ -316,16 +323,18 @@ def _energy_rows() -> list[Row]:
 
 def _fault_rows() -> list[Row]:
     """Rows: how much a small fault in one implementation changes the quantities of the other rows."""
-    equations, engine = Equations(CHOSEN, 60.0), implementation("mujoco")(CHOSEN, 60.0)
-    state = equations.displaced(3e-3)
+    equations, engine = Equations(CHOSEN_WHEELSET, 60.0), implementation("mujoco")(CHOSEN_WHEELSET, 60.0)
+    state = equations.displaced_state(3e-3)
     right = largest_relative_difference(engine.rates(state), equations.rates(state))
-    with faults.creeping(faults.spin_reversed)()():
+    with faults.creep_law_patch(faults.spin_reversed)()():
         spin = largest_relative_difference(engine.rates(state), equations.rates(state))
-    softer = CHOSEN.changed(stiffness_x=0.99 * CHOSEN.stiffness_x)
-    stiff, other = (critical_speed(wheelset, partial(growth, Equations)) for wheelset in (CHOSEN, softer))
+    softer = CHOSEN_WHEELSET.changed(stiffness_x=0.99 * CHOSEN_WHEELSET.stiffness_x)
+    stiff, other = (
+        critical_speed(wheelset, partial(largest_growth, Equations)) for wheelset in (CHOSEN_WHEELSET, softer)
+    )
     seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / stiff - 1.0) > 1e-6}
     return [
-        behaves(
+        behaviour_row(
             f"wheelset.fault.{name.split()[-1]}",
             SYSTEM,
             f"a planted fault in a single implementation is noticed: {name}",
@@ -359,7 +368,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     note = "In m/s, with linear creep; parameters drawn at random but for the chosen ones."
     heads = ("wheelset", "implementation", "speed [m/s]", "amplitude [mm]", "error", "frequency [Hz]", "error")
     return [
-        Table("Critical speed of wheelsets", note, ("wheelset", *IMPLEMENTATIONS), speeds),
+        Table("Critical speed of wheelsets", note, ("wheelset", *IMPLEMENTATION_MODULES), speeds),
         Table(
             "Limit cycles of wheelsets",
             "With FASTSIM, 11 cells; errors are what halving the step changes.",

@@ -28,7 +28,7 @@ class ChoiceQuestion:
 def draw_scene(system: str, seed: int) -> ChoiceQuestion:
     """The random scene of a system for a seed."""
     draw = np.random.default_rng([SEED, seed])
-    table, quantities = DRAWN[system](draw)
+    table, quantities = DRAWN_SYSTEMS[system](draw)
     return ChoiceQuestion(
         {"title": f"drawn {seed}", "system": system, **table}, quantities, TOLERANCES[seed % len(TOLERANCES)]
     )
@@ -61,7 +61,7 @@ def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, .
     return {"run": {"duration": 2.0, "step": step}, "start": start, "effects": effects}, tuple(map(str, asked))
 
 
-def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _random_wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A random wheelset scene at a speed below or above critical, with a displacement from small up to flange
     contact."""
     factors = {name: float(np.exp(rng.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
@@ -81,7 +81,7 @@ def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]
     }, tuple(map(str, asked))
 
 
-def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _random_stop(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A truck that stops on one of four surfaces, with and without anti-lock control."""
     push_out = float(rng.uniform(0.05, 0.8))
     table: dict[str, Any] = {
@@ -107,4 +107,4 @@ def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]
     return table, tuple(map(str, asked))
 
 
-DRAWN = {"pitch-plane": _pitch_plane, "wheelset": _wheelset, "braking": _braking}
+DRAWN_SYSTEMS = {"pitch-plane": _pitch_plane, "wheelset": _random_wheelset, "braking": _random_stop}

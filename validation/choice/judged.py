@@ -10,34 +10,37 @@ import numpy as np
 
 from models.advice.choice.choose import Choice as ChoiceByRuns
 from models.advice.choice.choose import Chooser as ChooserByRuns
-from models.advice.ride_choice.candidates import Set, largest_changes
+from models.advice.ride_choice.candidates import EffectSet, largest_changes
 from models.advice.ride_choice.choose import Chooser, RideChoice
 from models.advice.ride_choice.march import longest_step
-from models.advice.ride_choice.parameters import PARAMETER_ERROR, parameters, scaled_vehicle
+from models.advice.ride_choice.parameters import PARAMETER_ERROR, scaled_vehicle, uncertain_parameters
 from models.advice.ride_choice.reduced import FullScene
-from models.advice.ride_choice.screen import confirmed
-from models.ride.frequency import spectra
-from models.systems.ride.reduced_scene import ReducedScene, without
+from models.advice.ride_choice.screen import exact_variances
+from models.ride.frequency import spectral_densities
+from models.systems.ride.reduced_scene import ReducedScene, reduced_without
 from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.sampled import Sampled
 from validation.ride.drawn_rides import BentRide, DrawnRide
 
-RANGE = (0.7, 1.0, 1.3)
+SPEED_SHARES = (0.7, 1.0, 1.3)
 """Speeds of a scene by the one that is drawn."""
-OMEGA = np.geomspace(1e-2, 3e5, 3000)
+ANGULAR_FREQUENCIES = np.geomspace(1e-2, 3e5, 3000)
 """rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
 def asked_speeds(drawn_scene: DrawnRide) -> Chooser:
     """A chooser for a range of speeds about the scene's speed."""
     return Chooser(
-        drawn_scene.scene, [share * drawn_scene.speed for share in RANGE], drawn_scene.quantities, drawn_scene.tolerance
+        drawn_scene.scene,
+        [share * drawn_scene.speed for share in SPEED_SHARES],
+        drawn_scene.quantities,
+        drawn_scene.tolerance,
     )
 
 
 def changes_by_frequency(chooser: Chooser, choice: RideChoice) -> np.ndarray:
     """Changes (quantities,) at the speed at which they are largest, by frequency responses."""
-    left = without(chooser.scene, choice.left_out)
+    left = reduced_without(chooser.scene, choice.left_out)
     ratios = [
         _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
         for whole in chooser.full_scenes
@@ -49,30 +52,30 @@ def _by_frequency(full_scene: FullScene, scene: ReducedScene, rows: list[int]) -
     """Variances (quantities,) from sums over frequencies with the matrices M, D, K. No state space is built, so that M
     may be singular."""
     rest = full_scene.reduced(scene)
-    densities = spectra(rest.vehicle, rest.excitation, full_scene.speed, OMEGA)[:, rows]
-    return 2 * np.trapezoid(densities, OMEGA, axis=0)
+    densities = spectral_densities(rest.vehicle, rest.excitation, full_scene.speed, ANGULAR_FREQUENCIES)[:, rows]
+    return 2 * np.trapezoid(densities, ANGULAR_FREQUENCIES, axis=0)
 
 
-def worst_nearby(chooser: Chooser, omitted_effects: Set, draws: int, seed: int) -> float:
+def worst_nearby(chooser: Chooser, omitted_effects: EffectSet, draws: int, seed: int) -> float:
     """Ratio of the largest change to the tolerance, over random speeds in the range with random errors of all
     parameters."""
     random, rest, worst = np.random.default_rng(seed), chooser.rest(omitted_effects), 0.0
     low, high = chooser.full_scenes[0].speed, chooser.full_scenes[-1].speed
-    names = parameters(chooser.scene.vehicle)
+    names = uncertain_parameters(chooser.scene.vehicle)
     for _ in range(draws):
         factors = dict(zip(names, 1.0 + PARAMETER_ERROR * random.uniform(-1.0, 1.0, len(names)), strict=True))
         full, left = (replace(scene, vehicle=scaled_vehicle(scene.vehicle, factors)) for scene in (chooser.scene, rest))
         whole = FullScene(full, float(random.uniform(low, high)))
-        ratio = confirmed(whole.reduced(left), chooser.rows) / confirmed(whole.full, chooser.rows)
+        ratio = exact_variances(whole.reduced(left), chooser.rows) / exact_variances(whole.full, chooser.rows)
         worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))
     return worst / chooser.tolerance
 
 
-def measured_step(chooser: Chooser, omitted_effects: Set) -> float:
+def measured_step(chooser: Chooser, omitted_effects: EffectSet) -> float:
     """Longest step (s) with which runs keep the tolerance, by the covariance of their sampled states; for quantities
     without weighting."""
     return longest_step(
-        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact(), chooser.tolerance
+        [Sampled(march) for march in chooser.marches(omitted_effects)], chooser.exact_deviations(), chooser.tolerance
     )
 
 
@@ -85,12 +88,14 @@ class JudgedByRuns:
     engine: str
     asked: ChoiceQuestion | BentRide
     choice: ChoiceByRuns
-    again: np.ndarray
+    repeated_changes: np.ndarray
 
     @property
-    def honest(self) -> bool:
+    def is_honest(self) -> bool:
         """False if the choice claims to keep the tolerance and the further runs break it."""
-        return not self.choice.within_tolerance or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
+        return not self.choice.within_tolerance or bool(
+            (self.repeated_changes <= self.asked.tolerance * (1 + 1e-9)).all()
+        )
 
 
 def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns:
@@ -99,11 +104,11 @@ def judged_of(request: ChoiceQuestion, system: str, engine: str) -> JudgedByRuns
     choice, runs = chooser.choose(), chooser.whole.variants
     full_run = runs.system.computed_quantities(request.scene(), engine)
     reduced_run = runs.system.computed_quantities(runs.changed(frozenset(choice.left_out), choice.times), engine)
-    again = [change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities]
+    again = [largest_change(full_run.of(name).cases, reduced_run.of(name).cases) for name in request.quantities]
     return JudgedByRuns(system, engine, request, choice, np.array(again))
 
 
-def change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:
+def largest_change(full_cases: tuple[np.ndarray, ...], reduced_cases: tuple[np.ndarray, ...]) -> float:
     """Largest relative change over the cases: rms difference at common rows divided by the path's standard deviation,
     or by the magnitude of a single number."""
     worst = 0.0

@@ -18,7 +18,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from models.advice.ride_choice.march import March
 
-SHARES = (0.0, 0.5, 1.0)
+STEP_SHARES = (0.0, 0.5, 1.0)
 """Of a step, where it reads the road."""
 
 
@@ -30,9 +30,9 @@ class Sampled:
     step: float = 0.0
 
     @property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest stable step (s)."""
-        return self.march.longest
+        return self.march.longest_stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities at the samples of a run in steps of ``step`` (s)."""
@@ -110,7 +110,7 @@ class Sampled:
     def _driven(self, axle: int, delay: float) -> np.ndarray:
         """Covariance (n, m) of a step's forcing with the filter states ``delay`` seconds after the step's start, in the
         axle's own time."""
-        parts = zip(self._input_matrix(axle), SHARES, strict=True)
+        parts = zip(self._input_matrix(axle), STEP_SHARES, strict=True)
         return sum(B @ self._road(share * self.step - delay) for B, share in parts)
 
     def _with_road(self, axle: int, delay: float) -> np.ndarray:
@@ -141,7 +141,7 @@ class Sampled:
         given += (self._motion_covariance[:, None] * self._state_by_forces(j, i)).conj().T
         given += sum(
             B @ self._driven(j, share * self.step + self._axle_lag(j, i)).conj().T
-            for B, share in zip(self._input_matrix(i), SHARES, strict=True)
+            for B, share in zip(self._input_matrix(i), STEP_SHARES, strict=True)
         )
         return given / (1 - self._motion_covariance[:, None] * self._motion_covariance.conj())
 
@@ -150,6 +150,6 @@ class Sampled:
         return np.asarray(
             sum(
                 self._with_road(i, self._axle_lag(i, j) + share * self.step) @ B.conj().T
-                for B, share in zip(self._input_matrix(j), SHARES, strict=True)
+                for B, share in zip(self._input_matrix(j), STEP_SHARES, strict=True)
             )
         )

@@ -4,7 +4,7 @@ from scipy.stats import chi2
 
 from validation.common.rows import Observed, Row
 
-LEVEL = 0.999
+CONFIDENCE_LEVEL = 0.999
 """Chance that a true law passes; the seeds are fixed, so a row either always passes or never does."""
 
 
@@ -13,9 +13,14 @@ def mean_square(observed: Observed, expected: float, freedom: int, why: str) -> 
     distribution.
 
     freedom times value by expected is chi-square with that many degrees of freedom; the row passes inside the
-    central band of LEVEL, and says how wide that is.
+    central band of CONFIDENCE_LEVEL, and says how wide that is.
     """
-    low, high = (float(chi2.ppf(part, freedom)) / freedom for part in ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
-    note = f"{why}; {100 * LEVEL:g} % band of {freedom:,} degrees of freedom: {low:.4f} to {high:.4f} times the law"
+    low, high = (
+        float(chi2.ppf(part, freedom)) / freedom for part in ((1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2)
+    )
+    note = (
+        f"{why}; {100 * CONFIDENCE_LEVEL:g} % band of {freedom:,} degrees of freedom: {low:.4f} to "
+        f"{high:.4f} times the law"
+    )
     middle, half = expected * (low + high) / 2, expected * (high - low) / 2
     return observed.within(middle, half, note, "closed form")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-MATRICES = {
+PUBLISHED_MATRICES = {
     "M": [[80.81722, 2.319413322087091], [2.319413322087091, 0.297841881996855]],
     "C1": [[0.0, 33.86641391492494], [-0.850356414569785, 1.685403973975596]],
     "g K0": [[-794.1195, -25.50126032301241], [-25.50126032301241, -7.880322817790395]],
@@ -10,8 +10,8 @@ MATRICES = {
 }
 WEAVE_SPEED, CAPSIZE_SPEED = 4.29238253634111, 6.02426201538837
 """m/s"""
-STANDSTILL = (3.13164324790656, 5.53094371765393)
-_TABLE = """
+EIGENVALUES_AT_STANDSTILL = (3.13164324790656, 5.53094371765393)
+_EIGENVALUE_TABLE = """
 1 3.52696170990070 0.80774027519930 -3.13423125066578 -7.11008014637442
 2 2.68234517512745 1.68066296590675 -3.07158645641514 -8.67387984831735
 3 1.70675605663975 2.31582447384325 -2.63366137253667 -10.35101467245920
@@ -26,13 +26,17 @@ _TABLE = """
 """Speed (m/s), weave (real and imaginary part), capsize, castering (1/s)."""
 
 
-def _published() -> dict[float, np.ndarray]:
-    rows = {0.0: np.array([-STANDSTILL[1], -STANDSTILL[0], *STANDSTILL], complex)}
-    for line in _TABLE.split("\n")[1:-1]:
+def _published_eigenvalues() -> dict[float, np.ndarray]:
+    rows = {
+        0.0: np.array(
+            [-EIGENVALUES_AT_STANDSTILL[1], -EIGENVALUES_AT_STANDSTILL[0], *EIGENVALUES_AT_STANDSTILL], complex
+        )
+    }
+    for line in _EIGENVALUE_TABLE.split("\n")[1:-1]:
         speed, real, imag, capsize, castering = map(float, line.split())
         rows[speed] = np.sort_complex(np.array([complex(real, imag), complex(real, -imag), capsize, castering]))
     return rows
 
 
-PUBLISHED = _published()
+PUBLISHED_EIGENVALUES = _published_eigenvalues()
 """Eigenvalues (4,) in 1/s, sorted, by speed (m/s)."""

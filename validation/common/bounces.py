@@ -16,8 +16,8 @@ from models.engines.assembly import Assembly
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane import Parameters
 
-AIR, PRESSED, HIT = range(3)
-BISECTIONS = 52
+IN_AIR, PRESSED, JUST_HIT = range(3)
+SWITCH_BISECTIONS = 52
 Pair = tuple[int, int]
 
 
@@ -30,7 +30,7 @@ class Bounces:
         mass, damping, stiffness = matrices(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
         self.rates = {
-            (i, j): _rates(mass, damping, stiffness, weight, _laws(self.p, (i, j)))
+            (i, j): _rate_matrix(mass, damping, stiffness, weight, _tyre_laws(self.p, (i, j)))
             for i, j in product(range(3), range(3))
         }
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
@@ -55,7 +55,7 @@ class Bounces:
     def _switch(self, x: np.ndarray, states: Pair, longest: float) -> tuple[float, np.ndarray]:
         """Time (s) at which a tyre changes its contact state, and the vehicle's state at that time."""
         before, after = 0.0, longest
-        for _ in range(BISECTIONS):
+        for _ in range(SWITCH_BISECTIONS):
             middle = 0.5 * (before + after)
             if self._states(expm(self.rates[states] * middle) @ x) == states:
                 before = middle
@@ -66,22 +66,22 @@ class Bounces:
     def _states(self, x: np.ndarray) -> Pair:
         """Contact state of each tyre."""
         p = self.p
-        return _state(p.k1 * x[0], p.d1 * x[4]), _state(p.k2 * x[1], p.d2 * x[5])
+        return _contact_state(p.k1 * x[0], p.d1 * x[4]), _contact_state(p.k2 * x[1], p.d2 * x[5])
 
 
-def _state(spring: float, damper: float) -> int:
+def _contact_state(spring: float, damper: float) -> int:
     if spring <= 0.0 or spring + damper <= 0.0:
-        return AIR
-    return HIT if damper > spring else PRESSED
+        return IN_AIR
+    return JUST_HIT if damper > spring else PRESSED
 
 
-def _laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
+def _tyre_laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
     """Stiffness (N/m) and damping (N s/m) of both tyres in their contact states."""
     laws = [((0.0, 0.0), (k, d), (2.0 * k, 0.0)) for k, d in ((p.k1, p.d1), (p.k2, p.d2))]
     return [law[state] for law, state in zip(laws, states, strict=True)]
 
 
-def _rates(
+def _rate_matrix(
     mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, laws: list[tuple[float, float]]
 ) -> np.ndarray:
     """Matrix A (9, 9) of x' = A x, where x is the vehicle's state followed by 1."""
@@ -93,7 +93,7 @@ def _rates(
     return a
 
 
-def energy(assembly: Assembly, states: np.ndarray) -> np.ndarray:
+def bounce_energy(assembly: Assembly, states: np.ndarray) -> np.ndarray:
     """Energy (m,) in J of states (m, 8) on a flat road: sum of kinetic energy, weight, suspension and compressed
     tyres."""
     p, vehicle = assembly.parameters, assembly.vehicle

@@ -8,11 +8,11 @@ from typing import Any
 from models.core.errors import InputError
 from validation.common.rows import STATUSES, Row, Saved, of_saved
 
-ROUNDING = 1e-9
+ROUNDING_SHARE = 1e-9
 """Relative change that rounding explains."""
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of its tolerance by which an error (expected 0) may change unmentioned: its digits are those of rounding."""
-KINDS = ("status", "gone", "new", "expected", "value")
+CHANGE_KINDS = ("status", "gone", "new", "expected", "value")
 """In the order in which they are told: what passes or fails now, then what is judged otherwise, then values."""
 
 Change = Saved
@@ -24,24 +24,24 @@ def read_results(path: Path) -> Saved:
     file = path / "results.json" if path.is_dir() else path
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-        return {"file": str(file), "provenance": _provenance(content), "rows": _rows(content)}
+        return {"file": str(file), "provenance": _provenance_tables(content), "rows": _rows_by_id(content)}
     except FileNotFoundError:
         raise InputError("--against", "", str(file), "no such file: name the results.json of a report") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("--against", "", str(file), f"cannot be read: {error}") from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        allowed = f"is not the results.json of a validation: {_told(error)}"
+        allowed = f"is not the results.json of a validation: {_misread_text(error)}"
         raise InputError("--against", "", str(file), allowed) from None
 
 
-def _told(error: Exception) -> str:
+def _misread_text(error: Exception) -> str:
     """Text on what is wrong with a file that was read."""
     if isinstance(error, json.JSONDecodeError):
         return f"line {error.lineno} is no JSON"
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _rows(content: Saved) -> dict[str, Saved]:
+def _rows_by_id(content: Saved) -> dict[str, Saved]:
     """Rows by id; raises ValueError if two rows have the same id, because only one of them would be compared."""
     saved = map(of_saved, content["rows"])
     rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
@@ -50,13 +50,13 @@ def _rows(content: Saved) -> dict[str, Saved]:
     return rows
 
 
-def _provenance(content: Saved) -> Saved:
+def _provenance_tables(content: Saved) -> Saved:
     """Provenance of the rows, as tables."""
     kept = dict(content["provenance"])
     return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def against(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
+def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
     """Comparison with an earlier report, for ``results.json``: the earlier file and commit, notes, and all changed
     rows.
 
@@ -70,7 +70,7 @@ def against(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
         "file": earlier_report["file"],
         "commit": str(was.get("commit", "unknown")),
         "note": "; ".join(notes),
-        "changes": changes(earlier_report["rows"], {row["id"]: row for row in rows}),
+        "changes": changed_rows(earlier_report["rows"], {row["id"]: row for row in rows}),
     }
 
 
@@ -90,18 +90,20 @@ def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any
     )
 
 
-def changes(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -> list[Change]:
-    """Changed rows by id, sorted by KINDS; rows with changed values are sorted by their change as a share of the
+def changed_rows(earlier_rows: dict[str, Saved], later_rows: dict[str, Saved]) -> list[Change]:
+    """Changed rows by id, sorted by CHANGE_KINDS; rows with changed values are sorted by their change as a share of the
     tolerance, largest first."""
     listed = [
         change
         for id in (*earlier_rows, *(id for id in later_rows if id not in earlier_rows))
         for change in _changes_of_row(id, earlier_rows.get(id), later_rows.get(id))
     ]
-    return sorted(listed, key=lambda entry: (KINDS.index(entry["kind"]), _rank(entry["after"]), -entry["size"]))
+    return sorted(
+        listed, key=lambda entry: (CHANGE_KINDS.index(entry["kind"]), _status_rank(entry["after"]), -entry["size"])
+    )
 
 
-def _rank(status: Any) -> int:
+def _status_rank(status: Any) -> int:
     """Rank of a status for sorting: the worst first; 0 for a value that is no status."""
     return STATUSES.index(status) if status in STATUSES else 0
 
@@ -127,9 +129,9 @@ def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[C
     if old["status"] != new["status"]:
         yield change("status", old["status"], new["status"])
     for name in ("expected", "tolerance"):
-        if _differ(old[name], new[name]):
+        if _values_differ(old[name], new[name]):
             yield change("expected", f"{name} {old[name]}", f"{name} {new[name]}")
-    size = _size(old, new)
+    size = _size_of_change(old, new)
     if size > 0.0:
         yield change("value", old["value"], new["value"], size)
 
@@ -138,30 +140,30 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _differ(old: Any, new: Any) -> bool:
+def _values_differ(old: Any, new: Any) -> bool:
     if not (_is_number(old) and _is_number(new)):
         return old != new
     both_none = old != old and new != new  # neither is a number
-    return not (both_none or old == new or abs(new - old) <= ROUNDING * max(abs(old), abs(new)))
+    return not (both_none or old == new or abs(new - old) <= ROUNDING_SHARE * max(abs(old), abs(new)))
 
 
-def _size(old: Saved, new: Saved) -> float:
+def _size_of_change(old: Saved, new: Saved) -> float:
     """Change of a value as a share of its tolerance, or of the value if there is no tolerance; 0 for mere rounding."""
     was, now, tolerance = old["value"], new["value"], new["tolerance"]
-    if not _differ(was, now):
+    if not _values_differ(was, now):
         return 0.0
     if not (_is_number(was) and _is_number(now)) or not abs(now - was) < float("inf"):
         return float("inf")
     if tolerance and _is_number(tolerance):
         share = abs(now - was) / tolerance
-        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE else share
+        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE_SHARE else share
     return abs(now - was) / max(abs(was), abs(now))
 
 
-def lines(compared: Saved) -> list[str]:
+def change_lines(compared: Saved) -> list[str]:
     """The comparison as text, changed rows first."""
     changed = compared["changes"]
-    names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
+    names = zip(CHANGE_KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
     head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
     told = [

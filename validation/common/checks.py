@@ -22,7 +22,7 @@ from models.vehicles import pitch_plane
 Make = Callable[[Assembly, Settings], Model]
 SEED = 20
 """Of the random states."""
-SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
+STATE_HALF_WIDTHS = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 """Half-width of the random states (m, rad, m/s, rad/s): pitch up to 34 degrees, far beyond any road."""
 
 
@@ -33,7 +33,7 @@ def engine(name: str) -> Make:
 
 def random_states(count: int = 100) -> np.ndarray:
     """The random states (count, 8) at which accelerations are compared; the same at every call."""
-    return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * SPREAD
+    return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * STATE_HALF_WIDTHS
 
 
 def accelerations(make_engine: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
@@ -49,10 +49,10 @@ def acceleration_gap(make_engine: Make, assembly: Assembly, settings: Settings, 
     """Largest difference from the accelerations of the paper's equations, relative to the largest acceleration."""
     states = random_states(count)
     hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
-    return relative(accelerations(make_engine, assembly, settings, states), hand)
+    return relative_difference(accelerations(make_engine, assembly, settings, states), hand)
 
 
-def relative(computed: np.ndarray, hand: np.ndarray) -> float:
+def relative_difference(computed: np.ndarray, hand: np.ndarray) -> float:
     """Largest difference divided by the largest expected magnitude."""
     return float(np.abs(computed - hand).max() / np.abs(hand).max())
 
@@ -126,11 +126,11 @@ def momentum_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> f
     masses = np.array([p.m1, p.m2, p.m3])
     momentum = trajectory.states[:, 4:7] @ masses
     weight = masses.sum() * p.g
-    expected = weight * trajectory.times - _impulse(assembly, settings)
+    expected = weight * trajectory.times - _force_impulse(assembly, settings)
     return float(np.abs(momentum - momentum[0] - expected).max() / (weight * settings.duration))
 
 
-def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
+def _force_impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
     """Integral of both wheel forces from 0 to each step's end, shape (n + 1,), N s."""
     signal, h, n = assembly.input, settings.step, settings.steps
     assert signal is not None
@@ -142,11 +142,11 @@ def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
 def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
     path = run(make_engine, assembly, settings)
-    if path is None or path.enforced is None:
+    if path is None or path.guiding_forces is None:
         return float("inf")
-    hand = engine("reference")(assembly, by_hand(settings)).run().enforced
+    hand = engine("reference")(assembly, by_hand(settings)).run().guiding_forces
     assert hand is not None
-    return float(np.sqrt(np.mean((path.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
+    return float(np.sqrt(np.mean((path.guiding_forces - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
 
 
 def by_hand(settings: Settings) -> Settings:

@@ -17,7 +17,7 @@ from models.core.whole_files import DISK_FULL_ERRORS
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import road_scene
 
-MOMENTS = 20
+MOMENTS_TRIED = 20
 
 
 @contextmanager
@@ -31,31 +31,31 @@ def files_of_at_most(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def damage(folder: Path) -> int:
+def damaged_moments(folder: Path) -> int:
     """Number of moments of a full disk at which a broken file remained, or no system error was reported."""
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
-    _save(result, folder / "whole")
-    whole = sizes(folder / "whole")
-    shares = np.linspace(0.0, 0.99, MOMENTS)
-    return sum(_damaged(result, folder / f"{i}", share, whole) for i, share in enumerate(shares))
+    _save_until_full(result, folder / "whole")
+    whole = file_sizes(folder / "whole")
+    shares = np.linspace(0.0, 0.99, MOMENTS_TRIED)
+    return sum(_is_damaged(result, folder / f"{i}", share, whole) for i, share in enumerate(shares))
 
 
-def sizes(folder: Path) -> dict[str, int]:
+def file_sizes(folder: Path) -> dict[str, int]:
     """Bytes of every file in a folder, by name."""
     return {path.name: path.stat().st_size for path in folder.iterdir()}
 
 
-def _damaged(result: Result, folder: Path, share: float, complete_sizes: dict[str, int]) -> bool:
+def _is_damaged(result: Result, folder: Path, share: float, complete_sizes: dict[str, int]) -> bool:
     folder.mkdir()
     try:
         with files_of_at_most(int(share * max(complete_sizes.values()))):
-            _save(result, folder)
+            _save_until_full(result, folder)
     except OSError as error:
-        return error.errno not in DISK_FULL_ERRORS or not sizes(folder).items() <= complete_sizes.items()
+        return error.errno not in DISK_FULL_ERRORS or not file_sizes(folder).items() <= complete_sizes.items()
     return True
 
 
-def _save(result: Result, folder: Path) -> None:
+def _save_until_full(result: Result, folder: Path) -> None:
     write_table(folder / "table.csv", {"time": ("s", result.times[::4]), "z3": ("m", result["z3"][::4])})
     result.save(folder / "result.nc")

@@ -3,7 +3,7 @@
 While a case is measured, every result that is judged is noted. A row rests on the results that were judged between the
 rows before it and itself, and so do those that follow it until another result is judged, or until the part of the case
 ends that made both run and row. A row that rests on a broken assumption fails, unless the runs were made within
-``allowing``. Runs in other processes are not seen.
+``allowing_breaches``. Runs in other processes are not seen.
 """
 
 import sys
@@ -22,11 +22,11 @@ ANY_ASSUMPTION = ""
 
 @dataclass(frozen=True)
 class Breach:
-    """An assumption that a run broke. ``why``: reason why this is allowed, "" if it is not."""
+    """An assumption that a run broke. ``permission``: reason why this is allowed, "" if it is not."""
 
     run: str
-    broken: BrokenAssumption
-    why: str
+    assumption: BrokenAssumption
+    permission: str
 
 
 @dataclass
@@ -34,87 +34,87 @@ class Grounds:
     """Broken assumptions of the runs since the last rows were made, and whether rows rest on them already."""
 
     breaches: list[Breach] = field(default_factory=list)
-    rested: bool = False
+    rows_rest_on_them: bool = False
     part: int = 0
-    closed: bool = False
+    is_closed: bool = False
 
     def note(self, run: Result) -> None:
         """Record the broken assumptions of a result."""
-        if self.rested:
-            self.breaches, self.rested, self.closed = [], False, False
+        if self.rows_rest_on_them:
+            self.breaches, self.rows_rest_on_them, self.is_closed = [], False, False
         self.part = _instruction_index()
-        name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED.get()
+        name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED_ASSUMPTIONS.get()
         for broken in broken_of(run):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def rest(self, allowed: bool) -> str:
         """Text on the broken assumptions on which the current row rests: the allowed ones, or those that are not."""
         same_part = self.part == _instruction_index()
-        self.rested, self.closed = True, self.closed or same_part
-        return "" if self.closed and not same_part else self.told(allowed)
+        self.rows_rest_on_them, self.is_closed = True, self.is_closed or same_part
+        return "" if self.is_closed and not same_part else self.told(allowed)
 
     def told(self, allowed: bool) -> str:
         """Text on each broken assumption (allowed or not): number of runs, longest share of time, and why it is
         allowed."""
         by_name: dict[str, list[Breach]] = {}
         for each in self.breaches:
-            if bool(each.why) == allowed:
-                by_name.setdefault(each.broken.name, []).append(each)
+            if bool(each.permission) == allowed:
+                by_name.setdefault(each.assumption.name, []).append(each)
         return "; ".join(_assumption_text(same) for same in by_name.values())
 
 
 def _assumption_text(same: list[Breach]) -> str:
-    worst = max(same, key=lambda each: each.broken.share)
+    worst = max(same, key=lambda each: each.assumption.share)
     runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
-    return f"{worst.broken.fact()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
+    return f"{worst.assumption.fact()} ({runs}{worst.run}){f': {worst.permission}' if worst.permission else ''}"
 
 
-_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
-_ALLOWED: ContextVar[dict[str, str]] = ContextVar("allowed", default={})  # noqa: B039  never changed in place
+_CURRENT_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
+_ALLOWED_ASSUMPTIONS: ContextVar[dict[str, str]] = ContextVar("allowed", default={})  # noqa: B039  never changed in place
 
 
 Answer = TypeVar("Answer")
 
 
-def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
+def measured_rows(measure: Callable[[], Answer]) -> tuple[Answer, str]:
     """Rows of a case with the broken assumptions of its runs, and the assumptions that were broken without permission
     after its last row."""
     grounds = Grounds()
-    before = _GROUNDS.set(grounds)
+    before = _CURRENT_GROUNDS.set(grounds)
     try:
         with watching(grounds.note):
             answer = measure()
     finally:
-        _GROUNDS.reset(before)
-    return answer, "" if grounds.rested else grounds.told(allowed=False)
+        _CURRENT_GROUNDS.reset(before)
+    return answer, "" if grounds.rows_rest_on_them else grounds.told(allowed=False)
 
 
 def _instruction_index() -> int:
     """Index of the bytecode instruction that ``measure`` is executing, also if ``measure`` is decorated."""
     frame, outer = sys._getframe(), sys._getframe()
-    while frame.f_back is not None and frame.f_code is not measured.__code__:
+    while frame.f_back is not None and frame.f_code is not measured_rows.__code__:
         outer = outer if frame.f_globals["__name__"] == "contextlib" else frame
         frame = frame.f_back
     return outer.f_lasti
 
 
 @contextmanager
-def allowing(why: str, *names: str) -> Iterator[None]:
+def allowing_breaches(why: str, *names: str) -> Iterator[None]:
     """Context in which runs may break the named assumptions, or any if none is named; it can decorate a function."""
-    before = _ALLOWED.set(_ALLOWED.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), why))
+    before = _ALLOWED_ASSUMPTIONS.set(_ALLOWED_ASSUMPTIONS.get() | dict.fromkeys(names or (ANY_ASSUMPTION,), why))
     try:
         yield
     finally:
-        _ALLOWED.reset(before)
+        _ALLOWED_ASSUMPTIONS.reset(before)
 
 
-def broken() -> str:
+def forbidden_breaches() -> str:
     """Broken assumptions that are not allowed and on which the current row rests."""
-    grounds = _GROUNDS.get()
+    grounds = _CURRENT_GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=False)
 
 
-def allowed() -> str:
+def allowed_breaches() -> str:
     """Allowed broken assumptions on which the current row rests."""
-    grounds = _GROUNDS.get()
+    grounds = _CURRENT_GROUNDS.get()
     return "" if grounds is None else grounds.rest(allowed=True)

@@ -22,8 +22,8 @@ Independence = Literal["native", "handed over", "shared kernel", "closed form", 
 """How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
 exact answer, a published figure, what was measured on a real vehicle, or no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
-"""In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is a
-stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
+"""In the order in which they are told. ``failed_row`` and ``passed`` are judged, the same on any machine; ``missed`` is
+a stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
 STATUSES: tuple[Status, ...] = get_args(Status)
 Side = Literal["at most", "at least"]
 """On which side of its bound an aim is reached."""
@@ -47,10 +47,10 @@ class Row:
     independence: Independence
     status: Status
     reason: str = ""
-    broken: str = field(default_factory=grounds.broken)
-    allowed: str = field(default_factory=grounds.allowed)
+    broken: str = field(default_factory=grounds.forbidden_breaches)
+    allowed: str = field(default_factory=grounds.allowed_breaches)
 
-    def grounded(self) -> "Row":
+    def with_grounds(self) -> "Row":
         """The row; its status is "failed" if it rests on an assumption that was broken without permission."""
         if not self.broken or self.status == "not run":
             return self
@@ -133,7 +133,7 @@ class Observed:
         return Row(*given, expected, tolerance, why, independence, status, reason)
 
 
-def behaves(
+def behaviour_row(
     id: str, system: System, quantity: str, outcome: str, expected: str, why: str, independence: Independence = "none"
 ) -> Row:
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
@@ -149,20 +149,20 @@ def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
     return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
 
 
-def failed(id: str, quantity: str, reason: str) -> Row:
+def failed_row(id: str, quantity: str, reason: str) -> Row:
     """Row for a case that gave no value, or whose value rests on a broken assumption."""
     return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
 
 
-def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
+def rows_on_grounds(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
     """Rows of a case, failed if they rest on an assumption that was broken without permission.
 
     What runs after the last row broke has a row of its own.
     """
-    (rows, data), last = grounds.measured(measure)
-    rows = [row.grounded() for row in rows]
+    (rows, data), last = grounds.measured_rows(measure)
+    rows = [row.with_grounds() for row in rows]
     if last:
-        rows.append(failed(f"{name}.assumptions", f"runs of case {name} after its last row", last))
+        rows.append(failed_row(f"{name}.assumptions", f"runs of case {name} after its last row", last))
     return rows, data
 
 

@@ -11,11 +11,11 @@ from models.core.result import Result
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, build
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.grounds import allowing
+from validation.common.grounds import allowing_breaches
 
-VEHICLES = ("itwm_drift", "asymmetric_twin")
+VEHICLE_SETS = ("itwm_drift", "asymmetric_twin")
 STUDY_ROAD = {"source": "study", "speed": 20.0}
-COURSE = "detrended_rms_course_2in.crg"
+COURSE_FILE = "detrended_rms_course_2in.crg"
 """The 504 m measured course; it is not part of the repository."""
 
 
@@ -23,7 +23,7 @@ def on_paper_road() -> ContextDecorator:
     """Context in which runs of the paper's vehicle, on its road or under its wheel forces, may break certain
     assumptions."""
     why = "the paper's linear tyres pull or lie on their rims at times on its road, on both sides of a comparison alike"
-    return allowing(why, "tyres press", "springs compressed", "tyres not flat")
+    return allowing_breaches(why, "tyres press", "springs compressed", "tyres not flat")
 
 
 def road_scene(
@@ -46,7 +46,7 @@ def road_scene(
     )
 
 
-def drive(
+def virtual_drive(
     folder: Path,
     duration: float,
     period: float = 1e-3,
@@ -70,7 +70,7 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """Scene of the vehicle driven by the wheel forces that ``drive`` wrote to the folder."""
+    """Scene of the vehicle driven by the wheel forces that ``virtual_drive`` wrote to the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {
@@ -90,6 +90,6 @@ def data_folder() -> Path | None:
     return Path(named) if named and Path(named).is_dir() else None
 
 
-def gap(first: Result, other_result: Result) -> float:
+def largest_difference(first: Result, other_result: Result) -> float:
     """Largest difference of any state (m, rad, m/s, rad/s) of two runs on the same times."""
     return float(np.abs(first.states - other_result.states).max())

@@ -78,19 +78,19 @@ class Weak(Right):
 WRONG_ENGINES = (Still, Boastful, Swapped, Weak)
 
 
-def passed(kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
+def integrators_that_pass(kinds: tuple[type, ...] = WRONG_ENGINES, duration: float = 0.5) -> list[str]:
     """Names of the integrators whose run on a road ends without an error being raised."""
     tables: tuple[dict[str, Any], ...] = (CATALOGUE, RECOMMENDED, OUTSIDE)
     before = [dict(table) for table in tables]
     try:
-        return [kind.__name__ for kind in kinds if _answers(kind, duration)]
+        return [kind.__name__ for kind in kinds if _gives_answer(kind, duration)]
     finally:
         for table, kept in zip(tables, before, strict=True):
             table.clear()
             table.update(kept)
 
 
-def _answers(kind: type, duration: float) -> bool:
+def _gives_answer(kind: type, duration: float) -> bool:
     name = f"{__name__}:{kind.__name__}"
     register(name)
     try:

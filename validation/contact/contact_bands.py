@@ -18,16 +18,16 @@ from models.contact.inputs import Array
 from models.contact.theories import Simplified
 from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import ContactCase
-from validation.contact.contact_set import FITTED, FRICTION, LOAD, read_contacts, read_drawn, read_wide
+from validation.contact.contact_set import FITTED_PART, FRICTION, LOAD, read_contacts, read_drawn, read_wide
 
-CELLS = 101
-"""In each strip of FASTSIM: its own error is then below 0.05 % of mu N."""
+CELLS_PER_STRIP = 101
+"""In each strip of FASTSIM_BANDS: its own error is then below 0.05 % of mu N."""
 HELD_SHARE, KNOWN_SHARE, FEWEST_OF_GROUP = 0.95, 0.96, 12
 """Part of unseen contacts that a band is to hold; of the known ones of each group between the neighbours of each knot;
 contacts that tell no quantile."""
 ROUNDING = 1e-9
 """Of a moment that is zero by symmetry."""
-FASTSIM = [
+FASTSIM_BANDS = [
     f"{kind} {bound}" for kind in ("blended", "one", "three") for bound in ("intermediate", "parabolic", "elliptic")
 ]
 
@@ -38,7 +38,7 @@ class TheoryErrors:
     N times the lever arm.
 
     error, moment_error : (n,) of both, in the same units. spinning : (n,) share of spin. group : (n,) numbers by
-    ``groups``.
+    ``groups_of_contacts``.
     """
 
     force: Array
@@ -49,14 +49,14 @@ class TheoryErrors:
     group: Array
 
     @property
-    def used(self) -> Array:
+    def used_friction(self) -> Array:
         """Magnitude (n,) of the force divided by mu N."""
         return np.linalg.norm(self.force, axis=1)
 
     @property
     def used_with_moment(self) -> Array:
         """Magnitude (n,) of force and moment together."""
-        return used_with_moment(self.used, self.moment)
+        return used_with_moment(self.used_friction, self.moment)
 
     def of(self, mask: Array) -> "TheoryErrors":
         """The contacts that a mask (n,) selects."""
@@ -64,9 +64,9 @@ class TheoryErrors:
 
 
 def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
-    """Forces (n, 3) of a theory, FASTSIM or "simplified": force divided by mu N, and moment divided by mu N and the
-    longer semi-axis."""
-    axes, motions = _arrays(cases)
+    """Forces (n, 3) of a theory, FASTSIM_BANDS or "simplified": force divided by mu N, and moment divided by mu N and
+    the longer semi-axis."""
+    axes, motions = _arrays_of_contacts(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
     if name == "simplified":
         pressed = [interpenetrating(by_axes(c.a, c.b, c.pair, load=LOAD), c.pair) for c in cases]
@@ -83,26 +83,31 @@ def forces(name: str, cases: list[ContactCase], cells: int) -> Array:
     return moved / unit
 
 
-def _arrays(cases: list[ContactCase]) -> tuple[Array, Array]:
+def _arrays_of_contacts(cases: list[ContactCase]) -> tuple[Array, Array]:
     """Semi-axes (2, n) and motions (3, n)."""
     return np.array([(c.a, c.b) for c in cases]).T, np.array([c.motion for c in cases]).T
 
 
-def groups(cases: list[ContactCase]) -> Array:
+def groups_of_contacts(cases: list[ContactCase]) -> Array:
     """Group number (n,) of each contact. Groups, in which theories have different errors, differ in Poisson's ratio, in
     spin with or against the lateral creepage, and in ellipses longer along or across the rolling direction."""
     kinds = [(c.pair.nu, c.parts[1] * c.parts[2] < 0, c.a < c.b) for c in cases]
     return np.unique(np.array(kinds, dtype=float), axis=0, return_inverse=True)[1].ravel()
 
 
-def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS) -> TheoryErrors:
+def theory_errors(name: str, cases: list[ContactCase], cells: int = CELLS_PER_STRIP) -> TheoryErrors:
     """A theory's forces, moments and errors."""
     answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
-    axes, motions = _arrays(cases)
+    axes, motions = _arrays_of_contacts(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
     off, share = answers - exact, spin_share(axes[0], axes[1], motions, nu)
     return TheoryErrors(
-        answers[:, :2], answers[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, groups(cases)
+        answers[:, :2],
+        answers[:, 2],
+        np.linalg.norm(off[:, :2], axis=1),
+        np.abs(off[:, 2]),
+        share,
+        groups_of_contacts(cases),
     )
 
 
@@ -111,12 +116,12 @@ def kept_shares(name: str, constant: TheoryErrors) -> tuple[float, float]:
     states."""
     moment = moment_band(name, constant.used_with_moment, constant.spinning)
     return (
-        float(np.mean(constant.error <= band(name, constant.used, constant.spinning))),
+        float(np.mean(constant.error <= band(name, constant.used_friction, constant.spinning))),
         float(np.mean(constant.moment_error <= moment + ROUNDING)),
     )
 
 
-def measured(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
+def measured_bands(error: Array, used: Array, theory: TheoryErrors) -> tuple[list[float], ...]:
     """Quantiles of the error at each knot, of the group of contacts with the largest; one list without spin and one
     with spin."""
     ends = (0.0, *KNOTS, 1.1)
@@ -135,11 +140,11 @@ def _largest_quantile(error: Array, rows: Array, group: Array) -> float:
 
 def main() -> None:
     """Print the rows of ``error_bands.csv``."""
-    known = read_contacts() + read_drawn(FITTED) + read_wide(FITTED)
-    theories = {name: theory_errors(name, known) for name in (*FASTSIM, "simplified")}
-    for quantity, error, used in (("force", "error", "used"), ("moment", "moment_error", "used_with_moment")):
+    known = read_contacts() + read_drawn(FITTED_PART) + read_wide(FITTED_PART)
+    theories = {name: theory_errors(name, known) for name in (*FASTSIM_BANDS, "simplified")}
+    for quantity, error, used in (("force", "error", "used_friction"), ("moment", "moment_error", "used_with_moment")):
         for name, theory in theories.items():
-            bands = measured(getattr(theory, error), getattr(theory, used), theory)
+            bands = measured_bands(getattr(theory, error), getattr(theory, used), theory)
             for spin, band_of in zip(("without", "with"), bands, strict=True):
                 print(",".join([quantity, name, spin, *(f"{value:.4f}" for value in band_of)]))
 

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.drawing.figures import COLOURS, COLUMN_WIDTH, PALE, SKY, SMALL_TEXT, VERMILION, heading, subplot_mosaic
+from models.drawing.figures import COLOURS, COLUMN_WIDTH, PALE, SKY, SMALL_TEXT, VERMILION, add_heading, subplot_mosaic
 
-LAWS = (
+LAW_NAMES = (
     "no contact",
     "empty callback",
     "linear theory",
@@ -17,12 +17,12 @@ LAWS = (
     "FASTSIM, 41 cells",
     "non-Hertzian",
 )
-NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
-PARTS = (("own", "engine", PALE), ("kernel", "kernel", SKY), ("over", "bridge", VERMILION))
-METHODS = {"mujoco": "Euler", "exudyn": "ExplicitEuler"}
+ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
+BRIDGE_NAMES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
+STEP_PARTS = (("own", "engine", PALE), ("kernel", "kernel", SKY), ("over", "bridge", VERMILION))
+METHOD_OF_ENGINE = {"mujoco": "Euler", "exudyn": "ExplicitEuler"}
 WHEELS = 4
-LINES = {1: ":", WHEELS: "-", 8: "--"}
+LINE_STYLES = {1: ":", WHEELS: "-", 8: "--"}
 
 
 def figure(points: list[dict[str, Any]]) -> Figure:
@@ -30,17 +30,20 @@ def figure(points: list[dict[str, Any]]) -> Figure:
     number of wheels."""
     drawing, places = subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(COLUMN_WIDTH, 8.6))
     left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
-    some = [p for p in points if METHODS[p["engine"]] == p["method"]]
+    some = [p for p in points if METHOD_OF_ENGINE[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
-    _laws(left, some)
-    _draw_stacked_shares(middle, [(f"{NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS])
+    _plot_laws(left, some)
     _draw_stacked_shares(
-        right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p) for p in best if p["main"]]
+        middle, [(f"{ENGINE_NAMES[p['engine']]}, {p['law']}", p) for p in best if p["wheels"] == WHEELS]
+    )
+    _draw_stacked_shares(
+        right,
+        [(f"{ENGINE_NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p) for p in best if p["main"]],
     )
     middle.set_title(f"Shares by law, {WHEELS} wheels")
     right.set_title("Shares by wheels, FASTSIM, 21 cells")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3)
-    heading(drawing, "A contact kernel inside an engine: what a step costs and what it is made of")
+    add_heading(drawing, "A contact kernel inside an engine: what a step costs and what it is made of")
     return drawing
 
 
@@ -48,27 +51,27 @@ def _main(engine: str) -> str:
     return "native" if engine == "mujoco" else "generic object"
 
 
-def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
+def _plot_laws(axis: Any, points: list[dict[str, Any]]) -> None:
     """Plot a line of the best bridge for each number of wheels, and marks for the other bridges."""
-    for engine in METHODS:
+    for engine in METHOD_OF_ENGINE:
         of_engine = [p for p in points if p["engine"] == engine]
-        for count, style in LINES.items():
+        for count, style in LINE_STYLES.items():
             line = [p for p in of_engine if p["wheels"] == count and p["bridge"] in ("none", "empty", _main(engine))]
-            x, y = np.array(sorted((LAWS.index(p["law"]), 1e6 * p["step"]) for p in line)).T
-            label = f"{NAMES[engine]}, {_main(engine)}, {count} wheel{'s' * (count > 1)}"
+            x, y = np.array(sorted((LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in line)).T
+            label = f"{ENGINE_NAMES[engine]}, {_main(engine)}, {count} wheel{'s' * (count > 1)}"
             axis.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
         others = [p for p in of_engine if p["bridge"] not in ("none", "empty", _main(engine))]
         for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
-            x, y = np.array([(LAWS.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
+            x, y = np.array([(LAW_NAMES.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
             axis.semilogy(
                 x,
                 y,
                 mark,
                 color=COLOURS[engine],
                 mfc="white",
-                label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}, {WHEELS} wheels",
+                label=f"{ENGINE_NAMES[engine]}, {BRIDGE_NAMES.get(bridge, bridge)}, {WHEELS} wheels",
             )
-    axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
+    axis.set_xticks(range(len(LAW_NAMES)), LAW_NAMES, rotation=35, ha="right")
     axis.set(ylabel="time per step [µs]", title="One call per step")
     axis.grid(True, axis="y", alpha=0.3)
     low, high = axis.get_ylim()
@@ -80,8 +83,8 @@ def _draw_stacked_shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) ->
     """Draw a bar of 100 % for each point, made of the shares of engine, kernel and bridge; negative shares count as
     zero."""
     labels, before = [label for label, _ in points], np.zeros(len(points))
-    whole = np.array([sum(max(p[part], 0.0) for part, _, _ in PARTS) for _, p in points])
-    for part, name, colour in PARTS:
+    whole = np.array([sum(max(p[part], 0.0) for part, _, _ in STEP_PARTS) for _, p in points])
+    for part, name, colour in STEP_PARTS:
         share = np.array([100.0 * max(p[part], 0.0) for _, p in points]) / whole
         axis.barh(labels, share, left=before, color=colour, label=name)
         for i, (at, value) in enumerate(zip(before, share, strict=True)):

@@ -21,10 +21,10 @@ from models.contact.material import Material, MaterialPair
 from models.systems.contact import work_precision
 from models.systems.contact.work_precision import ContactCase, ellipse_cases, with_exact_forces
 
-RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
-LEVELS = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)
-KINDS = {
-    **work_precision.KINDS,
+AXIS_RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
+CREEPAGE_SIZES = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)
+CREEPAGE_KINDS = {
+    **work_precision.CREEPAGE_KINDS,
     **{
         f"y{sign}spin {angle}": (0.0, cos(radians(angle)), float(f"{sign}1") * sin(radians(angle)))
         for angle in (15, 30)
@@ -34,35 +34,41 @@ KINDS = {
 """Parts of the creepages; lateral creepage with and against spin, where theories differ most, by angles in degrees."""
 SIZE, LOAD, FRICTION, PAIR = 5e-3, 8e4, 0.3, MaterialPair()
 """sqrt(ab) in m, N, coefficient of friction and materials with which the set is computed."""
-SEED, DRAWN, RANGE = 43, 300, (0.2, 10.0)
+SEED, DRAWN_CONTACTS, SIZE_RANGE = 43, 300, (0.2, 10.0)
 """Of the drawn contacts: seed, how many in each part, and their sizes."""
 WIDE_RATIOS, WIDE_RANGE, POISSON = (0.1, 10.0), (0.05, 10.0), (0.0, 0.28, 0.5)
 """Of the wide contacts: a/b, sizes of the creepages, and Poisson's ratios in turn."""
 WIDE_CONTACTS, ABSENT_SHARE = ((300, 450), (300,)), 0.25
 """Wide contacts in each part, draw by draw; share of them that have no xi_x, no xi_y and no spin."""
-FITTED, JUDGED = 0, 1
+FITTED_PART, JUDGED_PART = 0, 1
 """Parts of the drawn contacts: one goes into the bands, the other one has never been seen by them."""
-FILE = Path(__file__).with_suffix(".csv")
-DRAWN_FILE, WIDE_FILE = (FILE.with_name(f"contact_{name}.csv") for name in ("drawn", "wide"))
-ANSWERS = ("fx", "fy", "mz", "error")
+FORCES_FILE = Path(__file__).with_suffix(".csv")
+DRAWN_FILE, WIDE_FILE = (FORCES_FILE.with_name(f"contact_{name}.csv") for name in ("drawn", "wide"))
+ANSWER_COLUMNS = ("fx", "fy", "mz", "error")
 Ends = tuple[float, float]
 
 
-def cases() -> list[ContactCase]:
+def regular_contacts() -> list[ContactCase]:
     """All contacts of the regular set, with no forces computed."""
-    return [case for ratio in RATIOS for case in ellipse_cases(*_axes(ratio), LOAD, FRICTION, PAIR, LEVELS, KINDS)]
+    return [
+        case
+        for ratio in AXIS_RATIOS
+        for case in ellipse_cases(*_semi_axes(ratio), LOAD, FRICTION, PAIR, CREEPAGE_SIZES, CREEPAGE_KINDS)
+    ]
 
 
 def drawn_contacts(part_number: int) -> list[ContactCase]:
     """One part of the randomly drawn contacts, with no forces computed; all directions of the scaled creepages are
     equally likely."""
-    return _draw_contacts(part_number, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part_number}", [PAIR])
+    return _draw_contacts(
+        part_number, DRAWN_CONTACTS, (AXIS_RATIOS[0], AXIS_RATIOS[-1]), SIZE_RANGE, f"drawn {part_number}", [PAIR]
+    )
 
 
 def wide_contacts(part_number: int) -> list[ContactCase]:
     """One part of the contacts with wide ranges of shape and material, with no forces computed."""
     bodies = [Material(E=PAIR.wheel.E, nu=nu) for nu in POISSON]
-    pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED]) * part_number
+    pairs, first = [MaterialPair(body, body) for body in bodies], 2 + len(WIDE_CONTACTS[FITTED_PART]) * part_number
     streams = enumerate(WIDE_CONTACTS[part_number], first)
     return [
         case
@@ -82,36 +88,38 @@ def _draw_contacts(
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
     drawn = zip(ratio, level, parts, cycle(pairs), strict=False)
-    return [ContactCase(*_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn]
+    return [
+        ContactCase(*_semi_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn
+    ]
 
 
-def _axes(ratio: float) -> tuple[float, float]:
+def _semi_axes(ratio: float) -> tuple[float, float]:
     return SIZE * ratio**0.5, SIZE / ratio**0.5
 
 
 def read_contacts() -> list[ContactCase]:
     """All contacts of the regular set, with their stored forces."""
-    return _read(FILE, cases())
+    return _read_contacts(FORCES_FILE, regular_contacts())
 
 
 def read_drawn(part_number: int) -> list[ContactCase]:
     """One part of the randomly drawn contacts, with their stored forces."""
-    return _read(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))[
-        part_number * DRAWN : (part_number + 1) * DRAWN
+    return _read_contacts(DRAWN_FILE, drawn_contacts(FITTED_PART) + drawn_contacts(JUDGED_PART))[
+        part_number * DRAWN_CONTACTS : (part_number + 1) * DRAWN_CONTACTS
     ]
 
 
 def read_wide(part_number: int) -> list[ContactCase]:
     """One part of the contacts with wide ranges, with their stored forces."""
-    return _read(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))[part_number * sum(WIDE_CONTACTS[FITTED]) :][
-        : sum(WIDE_CONTACTS[part_number])
-    ]
+    return _read_contacts(WIDE_FILE, wide_contacts(FITTED_PART) + wide_contacts(JUDGED_PART))[
+        part_number * sum(WIDE_CONTACTS[FITTED_PART]) :
+    ][: sum(WIDE_CONTACTS[part_number])]
 
 
-def _read(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
+def _read_contacts(path: Path, contacts: list[ContactCase]) -> list[ContactCase]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWERS} for row in rows]
+    forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWER_COLUMNS} for row in rows]
     return [replace(case, **force) for case, force in zip(contacts, forces, strict=True)]
 
 
@@ -119,14 +127,14 @@ def write(path: Path, contacts: list[ContactCase]) -> None:
     """Compute and write the forces of the given contacts."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("ratio", "kind", "level", *ANSWERS))
+        writer.writerow(("ratio", "kind", "level", *ANSWER_COLUMNS))
         for case in map(with_exact_forces, contacts):
-            numbers = (f"{getattr(case, name):.6f}" for name in ANSWERS)
+            numbers = (f"{getattr(case, name):.6f}" for name in ANSWER_COLUMNS)
             writer.writerow((round(case.a / case.b, 9), case.kind, round(case.level, 9), *numbers))
             file.flush()
 
 
 if __name__ == "__main__":
-    write(FILE, cases())
-    write(DRAWN_FILE, drawn_contacts(FITTED) + drawn_contacts(JUDGED))
-    write(WIDE_FILE, wide_contacts(FITTED) + wide_contacts(JUDGED))
+    write(FORCES_FILE, regular_contacts())
+    write(DRAWN_FILE, drawn_contacts(FITTED_PART) + drawn_contacts(JUDGED_PART))
+    write(WIDE_FILE, wide_contacts(FITTED_PART) + wide_contacts(JUDGED_PART))

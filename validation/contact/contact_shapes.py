@@ -20,9 +20,9 @@ PAIR = MaterialPair()
 FRICTION = 0.3
 CURVATURE = 1.0 / 0.92
 """A of a wheel of 0.46 m radius (1/m)."""
-LEVELS = (0.5, 2.0)
+CREEPAGE_SIZES = (0.5, 2.0)
 """Creepages by the linear scale mu N / (4 G c^2), c the radius of a circle of the exact area."""
-KINDS = {
+CREEPAGE_KINDS = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),
     "spin": (0.0, 0.0, 1.0),
@@ -51,7 +51,7 @@ def _shape_of_formula(name: str, height: Callable[[Array, Array], Array], load: 
     return Shape(name, distance, load, (-x, x, -y, y))
 
 
-def _hertz(name: str, ratio: float, x: float, y: float) -> Shape:
+def _hertz_shape(name: str, ratio: float, x: float, y: float) -> Shape:
     return _shape_of_formula(name, lambda u, v: CURVATURE * (u**2 + ratio * v**2), 1e5, x, y)
 
 
@@ -67,13 +67,13 @@ def _two_grooves(name: str, ridge: float, load: float, half: float = 3e-3, tilt:
     )
 
 
-def formulas() -> list[Shape]:
+def shapes_by_formula() -> list[Shape]:
     """Shapes whose distance is given by a formula."""
     apart = 8e-3
     return [
-        _hertz("circle", 1.0, 0.0078, 0.0078),
-        _hertz("ellipse, B/A = 5", 5.0, 0.0098, 0.0037),
-        _hertz("ellipse, B/A = 1/5", 0.2, 0.0078, 0.0235),
+        _hertz_shape("circle", 1.0, 0.0078, 0.0078),
+        _hertz_shape("ellipse, B/A = 5", 5.0, 0.0098, 0.0037),
+        _hertz_shape("ellipse, B/A = 1/5", 0.2, 0.0078, 0.0235),
         _shape_of_formula("quartic in y", lambda u, v: CURVATURE * u**2 + 2e4 * v**4, 5e4, 0.0078, 0.0078),
         _shape_of_formula("egg", lambda u, v: CURVATURE * u**2 + np.where(v > 0, 3.0, 0.7) * v**2, 5e4, 0.0072, 0.0088),
         _shape_of_formula(
@@ -88,7 +88,7 @@ def formulas() -> list[Shape]:
     ]
 
 
-def grown() -> list[Shape]:
+def merged_shapes() -> list[Shape]:
     """Shapes whose contact areas have merged, with ridges and distances of many sizes; in the last ones along x, and of
     three areas."""
     wells = (
@@ -142,7 +142,7 @@ def grown() -> list[Shape]:
     ]
 
 
-def profiles() -> list[Shape]:
+def profile_shapes() -> list[Shape]:
     """Main contact patch of the right wheel (S1002 on UIC 60, inclined 1:40) at several lateral shifts (m) and loads
     (N)."""
     shapes = []
@@ -163,7 +163,7 @@ class PlacedWheelset:
     touches: list[TouchingPlace]
 
 
-def placed() -> list[PlacedWheelset]:
+def placed_wheelsets() -> list[PlacedWheelset]:
     """Placements of S1002 on UIC 60, with and without yaw, at which the contact normals are nearly vertical.
 
     Half-spaces are joined along the contour there; flange and tread lie on none.
@@ -172,16 +172,16 @@ def placed() -> list[PlacedWheelset]:
     for yaw in (0.0, 0.01, -0.02):
         for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
             touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
-            if max(touch.patch.lean for touch in touches) < UPRIGHT or len(touches) == 1:
+            if max(touch.patch.lean for touch in touches) < JOINED_ANGLE or len(touches) == 1:
                 wheelsets += [PlacedWheelset(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
     return wheelsets
 
 
-UPRIGHT = 0.15
+JOINED_ANGLE = 0.15
 """Angle (rad) between patch and track up to which several patches are joined to one half-space."""
 
 
-MARGINS = (1.4, 2.0, 3.0)
+GRID_MARGINS = (1.4, 2.0, 3.0)
 """Sides of the exact grid divided by those of the simplified theory's area."""
 
 
@@ -195,7 +195,7 @@ def exact_placed(wheelset: PlacedWheelset, normal_contact: NormalContact, cells:
     ).T
     (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
     slope = float(np.cos(min(part.patch.lean for part in normal_contact.patches)))
-    for margin in MARGINS:
+    for margin in GRID_MARGINS:
         step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
         x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
         heights = np.min([_height(touch.patch, x, y) for touch in wheelset.touches], axis=0)
@@ -235,8 +235,8 @@ def creepages(area: float, load: float) -> dict[tuple[str, float], tuple[float, 
     scale = FRICTION * load / (4.0 * PAIR.G * c**2)
     return {
         (name, level): (level * scale * x, level * scale * y, level * scale * spin / c)
-        for name, (x, y, spin) in KINDS.items()
-        for level in LEVELS
+        for name, (x, y, spin) in CREEPAGE_KINDS.items()
+        for level in CREEPAGE_SIZES
     }
 
 

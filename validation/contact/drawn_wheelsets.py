@@ -6,17 +6,17 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from models.rail.eigenvalues import free_wheelset, growth
+from models.rail.eigenvalues import free_wheelset, largest_growth
 from models.rail.linear import LOWEST_SPEED, critical_or_why
-from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
-from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
+from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
+from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, implementation
 
 Speeds = dict[str, dict[str, float | None]]
 """Critical speeds (m/s) by wheelset and implementation, None where there is none."""
 SEED = 2026
-DRAWN = 6
+DRAWN_COUNT = 6
 """Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
-RANGES = {
+PARAMETER_RANGES = {
     "mass": (800.0, 2000.0),
     "spin_inertia": (50.0, 200.0),
     "yaw_inertia": (500.0, 1500.0),
@@ -34,29 +34,29 @@ RANGES = {
     "damping_z": (1e3, 2e4),
     "friction": (0.1, 0.5),
 }
-STIFF_WHEELSET = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
-HEAVY_WHEELSET = free_wheelset(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
+STIFF_WHEELSET = CHOSEN_WHEELSET.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
+HEAVY_WHEELSET = free_wheelset(CHOSEN_WHEELSET).changed(mass=1e4, yaw_inertia=3e4)
 """So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
 HALF_BRACKET, LOWER_SPEEDS = 0.02, 5
 """Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
 
 
 def drawn_wheelsets() -> dict[str, Wheelset]:
-    """Wheelsets with random parameters, distributed evenly in the logarithm over RANGES."""
+    """Wheelsets with random parameters, distributed evenly in the logarithm over PARAMETER_RANGES."""
     draw, wheelsets = np.random.default_rng(SEED), dict[str, Wheelset]()
-    while len(wheelsets) < DRAWN:
-        values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
+    while len(wheelsets) < DRAWN_COUNT:
+        values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in PARAMETER_RANGES.items()}
         if values["load"] > 1.5 * GRAVITY * values["mass"]:
-            wheelsets[f"drawn {len(wheelsets) + 1}"] = CHOSEN.changed(**values)
+            wheelsets[f"drawn {len(wheelsets) + 1}"] = CHOSEN_WHEELSET.changed(**values)
     return wheelsets
 
 
-def criticals(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None]:
+def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float | None]:
     """Critical speed (m/s) in each implementation; None where there is none. With ``search_nearby`` the engines search
     near the reference's critical speed."""
     speeds: dict[str, float | None] = {}
-    for engine in IMPLEMENTATIONS:
-        of, first = partial(growth, implementation(engine)), speeds.get("reference")
+    for engine in IMPLEMENTATION_MODULES:
+        of, first = partial(largest_growth, implementation(engine)), speeds.get("reference")
         speeds[engine] = (
             _critical_speed_near(partial(of, wheelset), first)
             if search_nearby and first

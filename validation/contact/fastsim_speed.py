@@ -20,13 +20,13 @@ SYSTEM: System = "contact"
 CELLS = 21
 ROUNDS, REPEATS = 300, 30
 CONTACTS = 400
-WHY = "median of interleaved rounds, seconds of the processor"
+TIMING_NOTE = "median of interleaved rounds, seconds of the processor"
 
 
 def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
     """Rows on the time of a call and of a cell, and a table (what, time, ratio to the bound)."""
     draw = np.random.default_rng(5)
-    blocks = _blocks(1)
+    blocks = _aligned_blocks(1)
     for name in ("u", "v0", "v1"):
         blocks[name] = draw.normal(0.0, 0.3, LANES)
     (_, cells), values = grid(CELLS, CELLS + 1, "intermediate").records, draw.uniform(1.0, 2.0, CELLS * LANES)
@@ -35,21 +35,24 @@ def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> t
     calls = {n: Ellipse(1.0, material_pair, cells=n) for n in (12, CELLS)}
     marched = REPEATS * CELLS * LANES
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
-        "bound": (partial(_bound, values, REPEATS), marched),
-        "plain": (partial(_plain, blocks, cells, REPEATS), marched),
+        "bound": (partial(_arithmetic_bound, values, REPEATS), marched),
+        "plain": (partial(_plain_loop, blocks, cells, REPEATS), marched),
         "second": (partial(_repeat_second_order, blocks, cells, REPEATS), marched),
-        **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
+        **{
+            f"call {n}": (partial(_call_kernel, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS)
+            for n, e in calls.items()
+        },
         **{
             f"many {march}": (partial(fastsim, many, material_pair, march=march), CONTACTS * CELLS * (CELLS + 1))
             for march in ("plain", "second-order")
         },
     }
-    took = _timed(jobs)
+    took = _processor_times(jobs)
     ratio = {name: paired_ratio(seconds, took["bound"]) for name, seconds in took.items()}
     calls_took = {n: median(1e6 * took[f"call {n}"]) for n in calls}
     rows = [
         Observed(f"fastsim.speed.{name}", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", value, unit).aim(
-            most, WHY
+            most, TIMING_NOTE
         )
         for name, what, (value, low, high), unit, most in (
             ("plain", "plain march per cell, by a root and a division", ratio["plain"], "", 1.8),
@@ -69,12 +72,12 @@ def speed(material_pair: MaterialPair, load: float, mu: float, axis: float) -> t
     return rows, table
 
 
-def _call(ellipse: Ellipse, values: tuple[float, ...]) -> None:
+def _call_kernel(ellipse: Ellipse, values: tuple[float, ...]) -> None:
     for _ in range(REPEATS):
         ellipse(*values)
 
 
-def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
+def _processor_times(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
     """Processor time (s) per unit of every job; the jobs take turns over several rounds."""
     for job, _ in jobs.values():
         job()
@@ -88,7 +91,7 @@ def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.nda
 
 
 @compiled
-def _bound(values, repeats):
+def _arithmetic_bound(values, repeats):
     """Lower bound for FASTSIM's arithmetic: one square root and one division per element, all independent, in vector
     registers."""
     total = 0.0
@@ -99,7 +102,7 @@ def _bound(values, repeats):
     return total
 
 
-def _blocks(count: int) -> np.ndarray:
+def _aligned_blocks(count: int) -> np.ndarray:
     """Array of zero blocks that is aligned to a vector register; without this the march takes half as long again."""
     room = np.zeros(count * BLOCK.itemsize // 8 + 8)
     first = -room.ctypes.data % 64 // 8
@@ -107,7 +110,7 @@ def _blocks(count: int) -> np.ndarray:
 
 
 @compiled
-def _plain(blocks, cells, repeats):
+def _plain_loop(blocks, cells, repeats):
     for _ in range(repeats):
         march_plain(blocks[0], cells)
 

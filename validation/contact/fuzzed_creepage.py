@@ -17,7 +17,7 @@ from models.contact.fastsim_grid import Bound, nets
 from models.contact.inputs import Array
 from models.contact.material import MaterialPair
 
-OPTIONS: tuple[dict[str, Any], ...] = (
+COMPUTED_OPTIONS: tuple[dict[str, Any], ...] = (
     {},
     {"cells": 11, "bound": "parabolic"},
     {"bound": "elliptic"},
@@ -28,18 +28,18 @@ OPTIONS: tuple[dict[str, Any], ...] = (
     {"cells": 12, "bound": "elliptic", "flexibilities": "three"},
 )
 """What the contacts are computed with, in turn."""
-KINDS = 8
+KIND_COUNT = 8
 SIMILAR_CONTACTS: dict[str, tuple[dict[str, float], tuple[float, ...]]] = {
     "reversal": ({"xi_x": -1.0, "xi_y": -1.0, "spin": -1.0}, (-1.0, -1.0, -1.0)),
     "mirror": ({"xi_y": -1.0, "spin": -1.0}, (1.0, -1.0, -1.0)),
     "similarity": ({"a": 2.0, "b": 2.0, "load": 8.0, "xi_x": 2.0, "xi_y": 2.0}, (8.0, 8.0, 16.0)),
 }
 """What changes in a contact, and fx, fy and mz by what they were; the last is the similar contact of twice the size."""
-ROUNDING = 1e-12
+SUM_ROUNDING = 1e-12
 """Of sums over some hundred cells, each right to 1e-16."""
 
 
-def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
+def random_contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     """``count`` random contacts: load 1e-6 to 1e6 N, friction 1e-6 to 1, a/b 1e-3 to 1e3, creepage 0 to 1, spin up to
     1/b.
 
@@ -50,7 +50,7 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     load, mu, ratio = (10.0 ** draw.uniform(*ends, count) for ends in ((-6, 6), (-6, 0), (-3, 3)))
     mean = 1.2e-4 * np.cbrt(load) * 10.0 ** draw.uniform(-0.5, 0.5, count)
     a, b = mean * np.sqrt(ratio), mean / np.sqrt(ratio)
-    kind = np.arange(count) % KINDS
+    kind = np.arange(count) % KIND_COUNT
     sizes = 10.0 ** draw.uniform(-12, 0, (3, count)) * draw.choice((-1.0, 1.0), (3, count))
     sizes[:, kind == 5] = np.abs(sizes[0, kind == 5]) * np.sign(sizes[:, kind == 5])
     xi_x, xi_y, spin = sizes[0], sizes[1], sizes[2] / np.maximum(a, b)

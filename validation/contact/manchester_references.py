@@ -34,9 +34,9 @@ PLANE = (5.0e-3, 727.0855e-3, -0.2905)
 """Shift (m) at which CONTACT joins two patches, and its plane there: place across the track (m), angle (rad)."""
 CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
-PATCH_LOAD_TOLERANCE, SUNK = 1e-4, 1e-8
+PATCH_LOAD_TOLERANCE, SINKING_TOLERANCE = 1e-4, 1e-8
 """Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
-SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
+SEARCH_REACH, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
 (m) over which the rail's angle is taken."""
 
@@ -52,7 +52,7 @@ def placed_at(case: str, shift: float) -> WheelsetPlacement:
     return contact_of(case).at(shift, SCENE.cases[case].yaw * shift)
 
 
-def sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
+def patch_sums(placed: WheelsetPlacement, wheel: str) -> tuple[float, float, float]:
     """Sums over the contact patches of one wheel: load-weighted lateral position (mm), normal force (N), and largest
     pressure (MPa)."""
     places = getattr(placed, wheel)
@@ -65,7 +65,7 @@ def on_one_plane(contact: WheelsetContact, placed: WheelsetPlacement) -> tuple[f
     """The right wheel with its gap measured along CONTACT's plane: mean position (mm), largest pressure (MPa), forces
     of both patches (N)."""
     side, (_, y, angle) = contact.side, PLANE
-    normal, pose = sum(touch.normal for touch in placed.right), _lowered(side, placed)
+    normal, pose = sum(touch.normal for touch in placed.right), _lowered_pose(side, placed)
     place = np.array([-7e-3, y, float(side.rail.curve(y))])
     x, s = centres(140, CELL), 5e-3 + centres(180, CELL)
 
@@ -86,7 +86,7 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
     Each patch sinks under the other one's resultant as Boussinesq's point force sinks a half-space at that distance.
     """
     side = contact.side
-    touches = touches_of(side, _lowered(side, placed))[: len(placed.right)]
+    touches = touches_of(side, _lowered_pose(side, placed))[: len(placed.right)]
     away = abs(touches[0].patch.contour_position - touches[1].patch.contour_position)
     vertical, cosines = sum(wheel.vertical for wheel in placed.right), [math.cos(touch.angle) for touch in touches]
 
@@ -103,7 +103,7 @@ def patch_forces(contact: WheelsetContact, placed: WheelsetPlacement) -> list[fl
             if np.abs(forces - before).max() < PATCH_LOAD_TOLERANCE * vertical:
                 return forces
 
-    approach = brentq(lambda approach: float(pressed(approach) @ cosines) - vertical, 0.0, 4e-5, xtol=SUNK)
+    approach = brentq(lambda approach: float(pressed(approach) @ cosines) - vertical, 0.0, 4e-5, xtol=SINKING_TOLERANCE)
     return [float(force) for force in pressed(approach)]
 
 
@@ -113,7 +113,7 @@ def _load_of_patch(distance: Distance, approach: float, material_pair: MaterialP
     return solve_normal(heights, 2e-4, 1e-4, material_pair, approach=approach).load if heights.min() < approach else 0.0
 
 
-def _lowered(side: WheelAndRail, placed: WheelsetPlacement) -> Pose:
+def _lowered_pose(side: WheelAndRail, placed: WheelsetPlacement) -> Pose:
     pose = Pose(placed.shift, placed.yaw, placed.roll, 0.0)
     return Pose(placed.shift, placed.yaw, placed.roll, side.clearance(pose))
 
@@ -125,7 +125,7 @@ def first_touch(side: WheelAndRail, placed: WheelsetPlacement, sign: float, gues
     Returns the place across the track and that on the wheel (m), and the rail's angle there (rad).
     """
     roll, yaw = sign * placed.roll, sign * placed.yaw
-    ahead, reach_u, reach_a = 0.0, SEARCHED[0], SEARCHED[1]
+    ahead, reach_u, reach_a = 0.0, SEARCH_REACH[0], SEARCH_REACH[1]
     for _ in range(HALVINGS):
         u, a = np.meshgrid(guess + reach_u * GRID, ahead + reach_a * GRID)
         radius = side.wheelset.radius + np.interp(u, side.wheel.y, side.wheel.z)

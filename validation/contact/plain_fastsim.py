@@ -29,7 +29,7 @@ Left = Callable[[float], float]
 """Share of the friction that is left at a slip velocity divided by the rolling speed."""
 
 
-def constant(slip: float) -> float:
+def coulomb_friction(slip: float) -> float:
     """Coulomb friction: the friction coefficient does not fall with the slip."""
     return 1.0
 
@@ -49,7 +49,7 @@ class PlainEllipse:
     flexible: tuple[float, float, float]
 
     @property
-    def c(self) -> float:
+    def mean_semi_axis(self) -> float:
         """Mean semi-axis sqrt(a b) (m)."""
         return math.sqrt(self.a * self.b)
 
@@ -65,7 +65,7 @@ class Program:
     march: str = "second-order"
 
 
-def hertz(small: float, large: float, elastic: float, load: float) -> tuple[float, float, float]:
+def hertz_ellipse(small: float, large: float, elastic: float, load: float) -> tuple[float, float, float]:
     """Long and short semi-axis and approach (m) from curvatures (1/m), E* (Pa) and load (N); Johnson, section 4.2."""
 
     def ratio_of(log_short: float) -> float:
@@ -84,7 +84,7 @@ def coefficients(ratio: float, nu: float) -> Array:
     """Kalker's C11, C22, C23, C33 (4,) at a/b and Poisson's ratio, see ``linear_theory.coefficients``."""
     inner = min(max(ratio, 0.1), 10.0)
     nodes = np.exp(NODES(math.log(inner)))
-    answer = np.array([_by_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
+    answer = np.array([_parabola_in_nu(values, power, nu) for values, power in zip(nodes, OF_NU, strict=True)])
     if inner == ratio:
         return answer
     asymptote, fading = (narrow_coefficients, NARROW_FADING) if ratio < 1.0 else (long_coefficients, LONG_FADING)
@@ -92,7 +92,7 @@ def coefficients(ratio: float, nu: float) -> Array:
     return asymptote(ratio, nu) * (1.0 + (answer / asymptote(inner, nu) - 1.0) * slenderness**fading)
 
 
-def _by_nu(values: Array, power: float, nu: float) -> float:
+def _parabola_in_nu(values: Array, power: float, nu: float) -> float:
     """Parabola in nu through the values at nu = 0, 1/4, 1/2, which are raised to a power before."""
     return float(barycentric_interpolate([0.0, 0.25, 0.5], values**power, nu)) ** (1.0 / power)
 
@@ -113,7 +113,7 @@ def long_coefficients(ratio: float, nu: float) -> Array:
     part = (1.0 - nu) * log_16 + 2.0 * nu
     c22 = 2.0 * math.pi / g * (1.0 + (1.0 - nu) * rest / part) / part
     c23 = 2.0 * math.pi / (3.0 * g * math.sqrt(g)) / ((1.0 - nu) * log_16 - 2.0 + 4.0 * nu)
-    return np.array([c11, c22, c23, _by_nu(np.exp(LONG_NODES(math.log(ratio))), OF_NU[3], nu)])
+    return np.array([c11, c22, c23, _parabola_in_nu(np.exp(LONG_NODES(math.log(ratio))), OF_NU[3], nu)])
 
 
 def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, float, float]:
@@ -126,7 +126,10 @@ def flexibilities(a: float, b: float, shear: float, nu: float) -> tuple[float, f
 
 def stiffnesses(ellipse: PlainEllipse, peak: float, kind: str) -> Array:
     """1/L along x, along y and in spin (3,); peak : bound in the middle (Pa)."""
-    three, creep = 1.0 / np.array(ellipse.flexible), np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.c])
+    three, creep = (
+        1.0 / np.array(ellipse.flexible),
+        np.array([ellipse.xi_x, ellipse.xi_y, ellipse.spin * ellipse.mean_semi_axis]),
+    )
     if kind == "three" or not creep.any():
         return three
     if kind == "one":
@@ -147,7 +150,7 @@ def _flexibility_share(ellipse: PlainEllipse, reach: Array) -> float:
     return 1.0 - math.exp(-begun - slides**3)
 
 
-def fastsim(ellipse: PlainEllipse, program: Program, left: Left = constant) -> tuple[Array, Array]:
+def fastsim(ellipse: PlainEllipse, program: Program, left: Left = coulomb_friction) -> tuple[Array, Array]:
     """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,); complex tractions (Pa) of all cells
     (strips, cells)."""
     a, b, n, power = ellipse.a, ellipse.b, program.cells, POWERS[program.bound]
@@ -159,13 +162,13 @@ def fastsim(ellipse: PlainEllipse, program: Program, left: Left = constant) -> t
     shape = (1.0 - (x / a) ** 2 - (y[:, None] / b) ** 2) ** power
     peak = ellipse.mu * ellipse.load / np.sum(shape * area)
     k = stiffnesses(ellipse, peak, program.flexibilities)
-    rows = [_strip(ellipse, program, (yy, hh), k, peak, left) for yy, hh in zip(y, half, strict=True)]
+    rows = [_strip_tractions(ellipse, program, (yy, hh), k, peak, left) for yy, hh in zip(y, half, strict=True)]
     p, slips = (np.array([row[i] for row in rows]) for i in range(2))
     force, turn = np.sum(p * area), np.sum((x * p.imag - y[:, None] * p.real) * area)
     return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), p
 
 
-def _strip(
+def _strip_tractions(
     ellipse: PlainEllipse, program: Program, place: tuple[float, float], k: Array, peak: float, left: Left
 ) -> tuple[list[complex], list[bool]]:
     """Tractions of one strip at y, with a half length (m), from the leading to the trailing edge, and whether each cell

@@ -12,8 +12,8 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from models.contact.inputs import Array
-from models.rail.profile_contact import SHARPEST, TOUCH, LaidProfile, Pose
-from validation.contact.plain_fastsim import hertz
+from models.rail.profile_contact import SHARPEST_CURVATURE, TOUCH, LaidProfile, Pose
+from validation.contact.plain_fastsim import hertz_ellipse
 
 SETTLED = 1e-12
 """Share of a patch's load by which loads and depths may disagree."""
@@ -25,7 +25,7 @@ def rail_of(profile: LaidProfile) -> PPoly:
     return PPoly(np.array([knots[name][:-1] for name in ("c3", "c2", "c1", "c0")]), knots["y"], extrapolate=False)
 
 
-def circles(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
+def circle_contacts(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, Array]:
     """For each circle of the wheel: penetration (n,), and its nearest point relative to the wheelset's centre and the
     rail's normal there, both (n, 3)."""
     head, nodes, rail = profile.head[0], profile.nodes, rail_of(profile)
@@ -44,7 +44,7 @@ def circles(side: int, pose: Pose, profile: LaidProfile) -> tuple[Array, Array, 
 
 def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> Array:
     """Contacts TOUCH (zones,) of a wheel; modulus : E* (Pa)."""
-    depth, points, normals = circles(side, pose, profile)
+    depth, points, normals = circle_contacts(side, pose, profile)
     zone, length = profile.nodes["zone"], np.arange(depth.size) * profile.head[0].spacing
     radial = Rotation.from_euler("ZX", [pose.yaw, pose.roll]).as_matrix()[:, 2]
     touches = np.zeros(int(profile.head[0].zones), TOUCH)
@@ -59,27 +59,27 @@ def touches_of(side: int, pose: Pose, profile: LaidProfile, modulus: float) -> A
         touch.x, touch.y, touch.z = np.average(points, axis=0, weights=weight)
         touch.along = 0.5 * normal @ radial / np.average(profile.nodes["radius"], weights=weight)
         width = 7.0 * np.cov(length, aweights=weight, ddof=0)
-        touch.across = touch.depth / (width + touch.depth / SHARPEST)
+        touch.across = touch.depth / (width + touch.depth / SHARPEST_CURVATURE)
     if np.count_nonzero(touches["depth"] > 0.0) > 1:
-        touches["depth"] = settled(touches, modulus)
+        touches["depth"] = settled_penetrations(touches, modulus)
     return touches
 
 
-def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
+def hertz_force(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
     """Normal force (N) and semi-axes along and across (m) by Hertz for a penetration (m); zeros where there is a
     gap."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
-    long, short, approach = hertz(min(along, across), max(along, across), modulus, 1.0)
+    long, short, approach = hertz_ellipse(min(along, across), max(along, across), modulus, 1.0)
     grown = (depth / approach) ** 0.5
     axes = (long, short) if along <= across else (short, long)
     return grown**3, grown * axes[0], grown * axes[1]
 
 
-def settled(touches: Array, modulus: float) -> Array:
+def settled_penetrations(touches: Array, modulus: float) -> Array:
     """Penetrations (n,) of contact patches, reduced by the surface deformation that the other patches cause."""
     alone = touches["depth"].copy()
-    loads, axes = np.array([pressed(t.depth, t.along, t.across, modulus)[:2] for t in touches]).T
+    loads, axes = np.array([hertz_force(t.depth, t.along, t.across, modulus)[:2] for t in touches]).T
     places = np.column_stack([touches[name] for name in ("x", "y", "z")])
     normals = np.column_stack([touches["n_y"], touches["n_z"]])
     apart = np.sum((places[:, None] - places) ** 2, axis=2) + (axes[:, None] ** 2 + axes**2) / 5.0

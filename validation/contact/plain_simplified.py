@@ -24,13 +24,13 @@ from models.contact.simplified_theory import SimplifiedOptions
 Box = tuple[float, float, float, float]
 
 
-def hermite(nodes: Array, padded: Array) -> CubicHermiteSpline:
+def hermite_spline(nodes: Array, padded: Array) -> CubicHermiteSpline:
     """Cubic spline along the first axis through values at equally spaced nodes; the values include one extra node at
     each end."""
     return CubicHermiteSpline(nodes, padded[1:-1], (padded[2:] - padded[:-2]) / (nodes[2] - nodes[0]))
 
 
-def continued(rows: Array) -> Array:
+def extrapolated_rows(rows: Array) -> Array:
     """Rows with an extra row at each end, extrapolated by the parabola through the three outermost."""
     return np.concatenate([[3 * rows[0] - 3 * rows[1] + rows[2]], rows, [3 * rows[-1] - 3 * rows[-2] + rows[-3]]])
 
@@ -48,11 +48,11 @@ class PlainBodies:
     @cached_property
     def padded(self) -> Array:
         """Heights with one extrapolated node added on every side."""
-        return continued(continued(self.height).T).T
+        return extrapolated_rows(extrapolated_rows(self.height).T).T
 
     def line(self, y: float, order: int = 0) -> CubicHermiteSpline:
         """Distance at a position y as a function of x, or its y derivative of the given order."""
-        return hermite(self.x, hermite(self.y, self.padded)(y, order))
+        return hermite_spline(self.x, hermite_spline(self.y, self.padded)(y, order))
 
     def at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Distance and its slopes in x and y on the grid of x (nx,) and y (ny,)."""
@@ -95,18 +95,18 @@ def _lowest_value(spline: CubicHermiteSpline) -> float:
     return float(min(spline(spline.x).min(), spline(turning[np.isfinite(turning)]).min(initial=np.inf)))
 
 
-def middles(low: float, high: float, count: int) -> Array:
+def interval_midpoints(low: float, high: float, count: int) -> Array:
     """Midpoints of equal intervals."""
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
-def overlap(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
+def pressure_from_heights(depth: float, low: float, height: Array, options: SimplifiedOptions) -> Array:
     """Pressure times W (m) at heights (m), for a contact of the given depth."""
     over = np.maximum(depth - height, 0.0)
     return over if options.shape == "parabolic" else np.sqrt(over * (depth - low))
 
 
-def spread(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
+def surface_displacement(values: Array, step: tuple[float, float], material_pair: MaterialPair, parts: Array) -> Array:
     """Displacement (m) on a square grid due to one component of traction (Pa) on it; parts : indices of displacement
     and traction component."""
     n = len(values)
@@ -136,15 +136,17 @@ def at_depth(bodies: PlainBodies, depth: float, material_pair: MaterialPair, opt
     """The patch at a depth, with its stiffness fitted on the coarse grid."""
     box, n = bodies.box(depth), options.net
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
-    height, slope_x, slope_y = bodies.at(middles(*box[:2], n), middles(*box[2:], n))
+    height, slope_x, slope_y = bodies.at(interval_midpoints(*box[:2], n), interval_midpoints(*box[2:], n))
     cover = np.clip(0.5 + (depth - height) / (np.abs(slope_x) * step[0] + np.abs(slope_y) * step[1]), 0.0, 1.0)
-    pressure = overlap(depth, bodies.low, height, options)
-    u = spread(pressure, step, material_pair, np.array([Z, Z]))
+    pressure = pressure_from_heights(depth, bodies.low, height, options)
+    u = surface_displacement(pressure, step, material_pair, np.array([Z, Z]))
     least = LEAST_STIFFNESS_SHARE * (depth - bodies.low) / np.average(u, weights=cover)
     stiffness = max(-1.0 / fitted_slopes(height[None], u[None], cover, step, options, True), least)
     approach = float(np.average(stiffness * u + height, weights=pressure))
     m = POINTS_PER_MESH * n
-    fine = overlap(depth, bodies.low, bodies.at(middles(*box[:2], m), middles(*box[2:], m))[0], options)
+    fine = pressure_from_heights(
+        depth, bodies.low, bodies.at(interval_midpoints(*box[:2], m), interval_midpoints(*box[2:], m))[0], options
+    )
     return PlainPatch(
         depth, float(fine.sum() * step[0] * step[1] / POINTS_PER_MESH**2), stiffness, approach, box, cover
     )
@@ -197,15 +199,15 @@ def strips(bodies: PlainBodies, patch: PlainPatch, cells: int, options: Simplifi
     """Strips between the two points at which the distance equals the depth. Strips too short to contain a node, or a
     midpoint between nodes, are left out, as the package looks for contact at these."""
     box, ends = patch.box, []
-    for y in middles(*box[2:], cells):
+    for y in interval_midpoints(*box[2:], cells):
         line = bodies.line(float(y))
         places = line.solve(patch.depth, extrapolate=False)
         looked = np.linspace(bodies.x[0], bodies.x[-1], 2 * bodies.x.size - 1)
         if places.size and (line(looked) < patch.depth).any():
             ends.append((y, places.min(), places.max(), line))
     y, low, high = (np.array([each[k] for each in ends]) for k in range(3))
-    rows = [each[3](middles(b, a, cells)) for each, a, b in zip(ends, low, high, strict=True)]
-    pressure = overlap(patch.depth, bodies.low, np.array(rows), options)
+    rows = [each[3](interval_midpoints(b, a, cells)) for each, a, b in zip(ends, low, high, strict=True)]
+    pressure = pressure_from_heights(patch.depth, bodies.low, np.array(rows), options)
     width = (box[3] - box[2]) / cells
     carried = np.sum(pressure * (high - low)[:, None] * width / cells)
     return Strips(y, low, high, width, pressure * patch.load / carried)
@@ -234,27 +236,29 @@ def march(net: Strips, mu: float, flexibility: float, motion: tuple[float, float
     return tractions, slips
 
 
-def gathered(net: Strips, tractions: Array, box: Box, n: int) -> Array:
+def mean_tractions(net: Strips, tractions: Array, box: Box, n: int) -> Array:
     """Mean tractions (2, n, n) in the cells of the coarse grid, weighted by the common area of both kinds of cells."""
-    across = _common(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
+    across = _common_lengths(net.y - 0.5 * net.width, net.y + 0.5 * net.width, np.linspace(*box[2:], n + 1))
     cells = net.high[:, None] - np.arange(tractions.shape[1] + 1) * (net.high - net.low)[:, None] / tractions.shape[1]
-    along = np.array([_common(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
+    along = np.array([_common_lengths(row[1:], row[:-1], np.linspace(*box[:2], n + 1)) for row in cells])
     mean = np.einsum("sj,sik,si->jk", across, along, tractions) * n**2 / ((box[1] - box[0]) * (box[3] - box[2]))
     return np.array([mean.real, mean.imag])
 
 
-def refitted(
+def fitted_flexibility(
     patch: PlainPatch, net: Strips, tractions: Array, material_pair: MaterialPair, options: SimplifiedOptions
 ) -> float:
     """Flexibility W_1 = W_2 (m/Pa), fitted to the tractions of a march."""
     n, box = options.net, patch.box
     step = (box[1] - box[0]) / n, (box[3] - box[2]) / n
-    p = gathered(net, tractions, box, n)
-    u = np.array([sum(spread(p[m], step, material_pair, np.array([k, m])) for m in range(2)) for k in range(2)])
+    p = mean_tractions(net, tractions, box, n)
+    u = np.array(
+        [sum(surface_displacement(p[m], step, material_pair, np.array([k, m])) for m in range(2)) for k in range(2)]
+    )
     return fitted_slopes(u, p, patch.cover, step, options)
 
 
-def _common(low: Array, high: Array, edges: Array) -> Array:
+def _common_lengths(low: Array, high: Array, edges: Array) -> Array:
     """Common lengths (m, n) of intervals (m,) and of the n segments between edges (n + 1,)."""
     return np.maximum(np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1]), 0.0)
 
@@ -271,9 +275,9 @@ def roll(
     """Forces fx, fy (N), moment mz (N m) and share of the area that sticks (4,), and flexibility W_1 (m/Pa)."""
     net = strips(bodies, patch, cells, options)
     first, _ = march(net, mu, 1.0 / patch.stiffness, motion)
-    flexibility = refitted(patch, net, first, material_pair, options)
+    flexibility = fitted_flexibility(patch, net, first, material_pair, options)
     p, slips = march(net, mu, flexibility, motion)
     area = ((net.high - net.low) / cells * net.width)[:, None] * np.ones(cells)
-    x = np.array([middles(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])
+    x = np.array([interval_midpoints(b, a, cells) for a, b in zip(net.low, net.high, strict=True)])
     force, turn = np.sum(p * area), np.sum((x * p.imag - net.y[:, None] * p.real) * area)
     return np.array([force.real, force.imag, turn, np.sum(area[~slips]) / np.sum(area)]), flexibility

@@ -14,7 +14,7 @@ from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import ContactCase
 from validation.common.rows import Table
 
-ROUNDS = 5
+TIMING_ROUNDS = 5
 """Of timing."""
 
 
@@ -35,10 +35,10 @@ def compare(cases: list[ContactCase]) -> dict[str, Any]:
         return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
 
     errors = {"1982": [error(case, old(case)) for case in cases], "1983": [error(case, new(case)) for case in cases]}
-    normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
+    normal = [_normal_errors(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
     ways = {"1982": old, "press": _normal_contact, "1983": new}
     jobs = [partial(way, cases[len(cases) // 2]) for way in ways.values()]
-    seconds = dict(zip(ways, interleave(jobs, ROUNDS).tolist(), strict=True))
+    seconds = dict(zip(ways, interleave(jobs, TIMING_ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
 
@@ -50,7 +50,7 @@ def _normal_contact(case: ContactCase) -> NormalContact:
     return interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
 
 
-def _normal(case: ContactCase, pressed: NormalContact) -> dict[str, float]:
+def _normal_errors(case: ContactCase, pressed: NormalContact) -> dict[str, float]:
     """Relative errors of approach, area and largest pressure."""
     hertz = by_axes(case.a, case.b, case.pair, load=case.load)
     exact = {"approach": float(hertz.approach), "area": np.pi * case.a * case.b, "peak": float(hertz.p0)}

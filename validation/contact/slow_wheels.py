@@ -11,7 +11,7 @@ from models.core.errors import Refused, RunFailed
 from models.engines.contact_bridge import Wheels, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.stability import LONG_RUN, limit
-from validation.common.rows import Observed, Row, System, Table, behaves
+from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
 SYSTEM: System = "rolling-vehicle"
 DURATION = 0.2
@@ -41,7 +41,7 @@ def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
     return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
-def counting(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
+def counting_calls(function: Callable[..., Any], calls: list[int], increment: int = 1) -> Callable[..., Any]:
     """The function, wrapped so that every call adds ``increment`` to ``calls``."""
 
     def counted(*arguments: Any) -> Any:
@@ -56,7 +56,7 @@ def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tu
     (wheels, start), calls = wheel(speed), [0]
     forces = Forces(wheels)
     slopes = forces.slopes if with_slopes and method in METHODS else None
-    rolling = Rolling(wheels, counting(forces.of, calls), slopes=slopes)
+    rolling = Rolling(wheels, counting_calls(forces.of, calls), slopes=slopes)
     return rolling.run(*start, steps, DURATION / steps, method)[: wheels.size], calls[0]
 
 
@@ -114,7 +114,7 @@ def rows(quick: bool) -> tuple[list[Row], list[SlowWheelsRun]]:
             said = "refused" if isinstance(error, Refused) else "raised"
         what = f"Exudyn at 0.1 m/s in steps of 1 ms, {method}, {name}"
         row = f"contact_bridges.low-speed.{name.replace(' ', '-')}"
-        judged.append(behaves(row, SYSTEM, what, said, expected, why, "none"))
+        judged.append(behaviour_row(row, SYSTEM, what, said, expected, why, "none"))
     return judged, done
 
 

@@ -5,21 +5,27 @@ import math
 import numpy as np
 
 from models.sensors.inertial_unit import error_rotation, measured_attitude, true_attitude
-from models.sensors.rotations import conjugate, exponential, logarithm, matrix, product
+from models.sensors.rotations import (
+    conjugate_quaternion,
+    exponential,
+    quaternion_product,
+    rotation_matrix,
+    rotation_vector,
+)
 
 SEED = 30
-CHUNK = 500
+PATHS_IN_MEMORY = 500
 """Paths that stand side by side in memory."""
-START = np.array([1.0, 0.0, 0.0, 0.0])
+START_ATTITUDE = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def turning(count: int, period: float) -> np.ndarray:
+def turning_rates(count: int, period: float) -> np.ndarray:
     """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
     t = period * np.arange(count)
     return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
 
 
-def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def coning_motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
     spin, half = 2.0, 0.3
     about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
@@ -27,25 +33,25 @@ def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rates = spin * np.column_stack(
         [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
     )
-    return rates, product(product(about, tilt), conjugate(about))
+    return rates, quaternion_product(quaternion_product(about, tilt), conjugate_quaternion(about))
 
 
 def largest_angle(first: np.ndarray, other_attitudes: np.ndarray) -> float:
     """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(logarithm(product(conjugate(first), other_attitudes))).max())
+    return float(np.abs(rotation_vector(quaternion_product(conjugate_quaternion(first), other_attitudes))).max())
 
 
-def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
+def attitude_errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
     """Rotations (paths, 4) between true and noisy attitude at the end, for noisy paths of one true motion."""
-    true = true_attitude(rates, period, START)[-1]
-    chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
-    ends = [measured_attitude(rates, period, deviation, START, chunk, SEED)[-1] for chunk in chunks]
+    true = true_attitude(rates, period, START_ATTITUDE)[-1]
+    chunks = [range(first, min(first + PATHS_IN_MEMORY, paths)) for first in range(0, paths, PATHS_IN_MEMORY)]
+    ends = [measured_attitude(rates, period, deviation, START_ATTITUDE, chunk, SEED)[-1] for chunk in chunks]
     return error_rotation(np.concatenate(ends), true)
 
 
 def standard_errors(attitudes: np.ndarray, law: np.ndarray) -> float:
     """Largest difference between the mean rotation matrix of quaternions (n, 4) and its law, in standard errors of the
     entry."""
-    samples = matrix(attitudes)
+    samples = rotation_matrix(attitudes)
     error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
     return float((np.abs(samples.mean(axis=0) - law) / error).max())

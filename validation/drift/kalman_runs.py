@@ -9,33 +9,41 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import butter, sosfiltfilt
 
-from models.core.noise import PITCH_SENSOR, normal
+from models.core.noise import PITCH_SENSOR, normal_samples
 from models.core.result import Result
 from models.core.time_series import write_time_series
 from models.drift.growth import spring_of
-from models.drift.score import CHANNELS, rms, section_forces
+from models.drift.score import SECTION_FORCE_CHANNELS, root_mean_square, section_forces
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.effects.kalman_filter import BANDWIDTH, guide_of
-from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE, Measurement, PitchEstimate, estimate
+from models.systems.pitch_plane.effects.kalman_filter import PULL_BANDWIDTH, guide_of
+from models.systems.pitch_plane.pitch_filter import (
+    KEPT_STATES,
+    PITCH,
+    PITCH_RATE,
+    RELATIVE_STATES,
+    Measurement,
+    PitchEstimate,
+    estimate,
+)
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble, changed
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement, write_wheel_forces
+from models.systems.pitch_plane.virtual_measurement import perturbed_parameters, write_measurement, write_wheel_forces
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from validation.common.scenes import force_scene, road_scene
 
-ANGLE = float(np.deg2rad(0.1))
+ANGLE_DEVIATION = float(np.deg2rad(0.1))
 """Deviation (rad) of the inertial unit, white at 1 kHz."""
-GYRO = 0.1
+GYRO_DEVIATION = 0.1
 """Deviation (rad/s) of the gyro, white at 1 kHz."""
-FRACTION = 0.002
+FORCE_NOISE_SHARE = 0.002
 """Deviation of the force noise by the largest force, at 1 kHz."""
 COARSE_PERIOD = 5e-3
 """Sampling period (s) of the statistics; deviations per sample then keep the intensity of those at 1 kHz."""
-BAND = 15.0
+JUDGED_BAND = 15.0
 """Hz, up to which the artificial moment is judged."""
 
 
@@ -46,7 +54,7 @@ def at_period(deviation: float, period: float) -> float:
 
 
 @cache
-def measured(folder: Path, duration: float, period: float) -> Result:
+def measured_drive(folder: Path, duration: float, period: float) -> Result:
     """Virtual measurement on the study road with rows ``period`` (s) apart; its files are written to the folder."""
     path = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
     write_measurement(path, folder, period)
@@ -55,15 +63,15 @@ def measured(folder: Path, duration: float, period: float) -> Result:
 
 def force_deviation(true: Result) -> float:
     """Standard deviation of the force noise: 0.2 % of the largest wheel force (N)."""
-    return FRACTION * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
+    return FORCE_NOISE_SHARE * float(max(np.abs(true["f1"]).max(), np.abs(true["f2"]).max()))
 
 
 def driven_vehicle(
     folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
 ) -> Scene:
     """Scene of the vehicle driven by the forces in the folder, with steps of 1 ms."""
-    override = perturbed(PARAMETERS) if wrong else {}
-    return changed(
+    override = perturbed_parameters(PARAMETERS) if wrong else {}
+    return changed_scene(
         force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
     )
 
@@ -85,32 +93,36 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
     The true vehicle starts turned by a random angle, which the filter knows the deviation of. NEES (6 states) is
     taken once a second from the second one on, far beyond the estimate's memory of some 0.2 s.
     """
-    true = measured(folder, duration, COARSE_PERIOD)
-    force, angle = at_period(force_deviation(true), COARSE_PERIOD), at_period(ANGLE, COARSE_PERIOD)
-    clean = assemble(driven_vehicle(folder, duration, {}))
-    turn = START * float(normal(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
+    true = measured_drive(folder, duration, COARSE_PERIOD)
+    force, angle = at_period(force_deviation(true), COARSE_PERIOD), at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    clean = assembly_of_scene(driven_vehicle(folder, duration, {}))
+    turn = START_DEVIATION * float(normal_samples(seed, 1, 1, 1, source=PITCH_SENSOR)[0, 0])
     p, start = clean.parameters, clean.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     states = free_run(replace(clean, initial=start), duration, COARSE_PERIOD)
-    seen = states[:, 3] + angle * normal(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
-    noisy = assemble(driven_vehicle(folder, duration, noise_of(force, seed)))
+    seen = states[:, 3] + angle * normal_samples(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
+    noisy = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
     figures = {}
     for name, (q, r) in scales.items():
         measurement = Measurement(seen[:, None], COARSE_PERIOD, (PITCH,), (angle * np.sqrt(r),))
-        filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START)
+        filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START_DEVIATION)
         first = round(1 / COARSE_PERIOD)
-        figures[name] = (nees(filtered, states), filtered.surprises[first:], filtered.innovations[first:])
+        figures[name] = (
+            normalised_estimation_error(filtered, states),
+            filtered.normalised_innovations[first:],
+            filtered.innovations[first:],
+        )
     return figures
 
 
-START = 0.02
+START_DEVIATION = 0.02
 """Deviation (rad) of the start in the runs on consistency."""
 
 
-def nees(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
+def normalised_estimation_error(estimated: PitchEstimate, states: np.ndarray) -> np.ndarray:
     """Normalised estimation error squared of the six states, once a second from the second one on."""
     rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
-    wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]
+    wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE_STATES.T)[:, :, None]
     return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.errors()[rows, :6, :6], wrong))[:, 0, 0]
 
 
@@ -125,12 +137,12 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
     """
     import control
 
-    force, angle = deviation, at_period(ANGLE, COARSE_PERIOD)
-    assembly = assemble(driven_vehicle(folder, 1.0, {}, geometry="linear"))
-    stiffness, damping = spring_of(assembly.parameters, BANDWIDTH, 0.7)
-    free, pushes = relative(assembly)
+    force, angle = deviation, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
+    assembly = assembly_of_scene(driven_vehicle(folder, 1.0, {}, geometry="linear"))
+    stiffness, damping = spring_of(assembly.parameters, PULL_BANDWIDTH, 0.7)
+    free, pushes = relative_state_matrices(assembly)
     lever = np.zeros((6, 6))
-    lever[RATE, [PITCH, RATE]] = np.array([stiffness, damping]) / assembly.parameters.I
+    lever[PITCH_RATE, [PITCH, PITCH_RATE]] = np.array([stiffness, damping]) / assembly.parameters.I
     f, g0, g1 = first_order_hold(free, pushes)
     h, m0, m1 = first_order_hold(free - lever, np.hstack([pushes, lever]))
     q = force**2 * (g0 + f @ g1) @ (g0 + f @ g1).T
@@ -148,13 +160,13 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
     return step, control.dlyap(step, scaled @ scaled.T)
 
 
-def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
     """Matrices A (6, 6) and B (6, 2) of the states relative to the chassis under wheel forces, linearised about zero
     pitch."""
     p = assembly.parameters
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE @ first_order(linearised(assembly.vehicle))[:, KEPT], RELATIVE @ pushes
+    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, KEPT_STATES], RELATIVE_STATES @ pushes
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -176,20 +188,22 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     deviation : N, at COARSE_PERIOD. The true vehicle rests, because the interpolation of a moving estimate between its
     samples would add an error that is no noise.
     """
-    rest = assemble(build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}}))
-    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE_PERIOD)
+    rest = assembly_of_scene(
+        build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}})
+    )
+    p, start, angle = rest.parameters, rest.initial, at_period(ANGLE_DEVIATION, COARSE_PERIOD)
     count = round(duration / COARSE_PERIOD) + 1
     write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE_PERIOD)
-    seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    seen = start[3] + angle * normal_samples(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE_PERIOD)
     effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
     noise = noise_of(deviation, seed)
     drawn = driven_vehicle(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
-    run = free_run(assemble(drawn), duration, COARSE_PERIOD)
+    run = free_run(assembly_of_scene(drawn), duration, COARSE_PERIOD)
     guide = guide_of(
-        assemble(driven_vehicle(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"]
+        assembly_of_scene(driven_vehicle(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"]
     )
-    errors = np.hstack([guide.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
+    errors = np.hstack([guide.states[:, :6] - RELATIVE_STATES @ start, (run - start) @ RELATIVE_STATES.T])
     return errors[round(2 / COARSE_PERIOD) :]
 
 
@@ -205,33 +219,38 @@ def spread_of_mean_square(step: np.ndarray, covariance: np.ndarray, count: int) 
     return np.sqrt(2.0 * total / count)
 
 
-def stabilised(
+def scores_of_stabilised(
     folder: Path, duration: float, seed: int, engines: tuple[str, ...], wrong: bool = True
 ) -> dict[str, dict[str, float]]:
     """Scores of the runs of each engine that the Kalman filter stabilises, for one noise sample: damage ratios, shares
     of the artificial moment, and pitch error."""
-    true = measured(folder, duration, 1e-3)
-    seen = true["pitch"] + ANGLE * normal(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
+    true = measured_drive(folder, duration, 1e-3)
+    seen = true["pitch"] + ANGLE_DEVIATION * normal_samples(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
     force = force_deviation(true)
-    effect = {"file": "read.csv", "force_deviation": force, "pitch_deviation": ANGLE, "inertia_deviation": INERTIA}
+    effect = {
+        "file": "read.csv",
+        "force_deviation": force,
+        "pitch_deviation": ANGLE_DEVIATION,
+        "inertia_deviation": INERTIA_UNCERTAINTY,
+    }
     scene = driven_vehicle(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}, wrong=wrong)
-    return {engine: _scored(true, simulate(scene, engine)) for engine in engines}
+    return {engine: _scores_of_run(true, simulate(scene, engine)) for engine in engines}
 
 
-INERTIA = 0.05
+INERTIA_UNCERTAINTY = 0.05
 """What the filter is told of the model: its inertia may be 5 % wrong."""
 
 
-def _scored(true: Result, run: Result) -> dict[str, float]:
+def _scores_of_run(true: Result, run: Result) -> dict[str, float]:
     wanted, had = (section_forces(each["f3"], each["f4"], each["pitch"]) for each in (true, run))
-    scores = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
+    scores = {name: damage_ratio(had[name], wanted[name]) for name in SECTION_FORCE_CHANNELS}
     term = PARAMETERS.I * np.gradient(true["pitch_rate"], true.times)
     moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
-    low = butter(4, BAND, fs=1 / float(true.times[1]), output="sos")
+    low = butter(4, JUDGED_BAND, fs=1 / float(true.times[1]), output="sos")
     for name, moment in moments.items():
-        scores[name] = rms(moment) / rms(term)
-        scores[f"{name}, band"] = rms(sosfiltfilt(low, moment)) / rms(sosfiltfilt(low, term))
+        scores[name] = root_mean_square(moment) / root_mean_square(term)
+        scores[f"{name}, band"] = root_mean_square(sosfiltfilt(low, moment)) / root_mean_square(sosfiltfilt(low, term))
     scores["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
     scores["inertia"] = float(run["inertia_share"][-1])
     return scores
@@ -246,15 +265,15 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     """
     import control
 
-    true = measured(folder, duration, COARSE_PERIOD)
-    force, gyro = at_period(force_deviation(true), COARSE_PERIOD), at_period(GYRO, COARSE_PERIOD)
-    assembly = assemble(driven_vehicle(folder, duration, noise_of(force, seed)))
+    true = measured_drive(folder, duration, COARSE_PERIOD)
+    force, gyro = at_period(force_deviation(true), COARSE_PERIOD), at_period(GYRO_DEVIATION, COARSE_PERIOD)
+    assembly = assembly_of_scene(driven_vehicle(folder, duration, noise_of(force, seed)))
     clean = true.states
-    seen = clean[:, 7] + gyro * normal(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
-    estimated = estimate(assembly, Measurement(seen[:, None], COARSE_PERIOD, (RATE,), (gyro,)), force)
+    seen = clean[:, 7] + gyro * normal_samples(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
+    estimated = estimate(assembly, Measurement(seen[:, None], COARSE_PERIOD, (PITCH_RATE,), (gyro,)), force)
     p, sure = assembly.parameters, np.sqrt(estimated.errors()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
-    growth = rms(true["pitch_rate"]) * np.sqrt(p.I / inertia)
+    growth = root_mean_square(true["pitch_rate"]) * np.sqrt(p.I / inertia)
     push = (force**2 * COARSE_PERIOD * (p.a**2 + p.b**2)) / inertia**2
     model, see = np.array([[0.0, 1.0], [growth**2, 0.0]]), np.array([[0.0, 1.0]])
     law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE_PERIOD]]))[0]
@@ -262,8 +281,8 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     return {
         "stated": float(sure[-1]),
         "law": float(np.sqrt(law[0, 0])),
-        "error": rms(wrong),
-        "walk": float(GYRO * np.sqrt(1e-3 * duration)),
+        "error": root_mean_square(wrong),
+        "walk": float(GYRO_DEVIATION * np.sqrt(1e-3 * duration)),
     }
 
 
@@ -277,14 +296,17 @@ def with_gaps(
 ) -> dict[str, float]:
     """Figures of a stabilised run on a file with missing samples: largest ratio of the pitch error to the deviation
     that the filter states, and counts of missing samples."""
-    true = measured(folder, duration, COARSE_PERIOD)
-    deviations = {PITCH: at_period(ANGLE, COARSE_PERIOD), RATE: at_period(GYRO, COARSE_PERIOD)}
-    clean = free_run(assemble(driven_vehicle(folder, duration, {})), duration, COARSE_PERIOD)
-    noise = normal(seed, 0, len(clean), 3, source=PITCH_SENSOR)
+    true = measured_drive(folder, duration, COARSE_PERIOD)
+    deviations = {
+        PITCH: at_period(ANGLE_DEVIATION, COARSE_PERIOD),
+        PITCH_RATE: at_period(GYRO_DEVIATION, COARSE_PERIOD),
+    }
+    clean = free_run(assembly_of_scene(driven_vehicle(folder, duration, {})), duration, COARSE_PERIOD)
+    noise = normal_samples(seed, 0, len(clean), 3, source=PITCH_SENSOR)
     lost = np.abs(noise[:, 2]) < random_gaps
     if outage is not None:
         lost[round(outage[0] / COARSE_PERIOD) : round(outage[1] / COARSE_PERIOD)] = True
-    names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
+    names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), PITCH_RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
     table, force = {}, at_period(force_deviation(true), COARSE_PERIOD)
     effect: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
     for i, column in enumerate(columns):

@@ -18,10 +18,10 @@ from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation, SettingChoice
 from models.advice.price.truth import ReferenceTruth, values_at
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 
-STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
-STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
+STEPS_TRIED = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
+METHOD_STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "Euler": ((0.0,), (1.0,)),
     "midpoint": ((0.0, 0.5), (0.0, 1.0)),
     "RK4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
@@ -29,7 +29,7 @@ STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
 """Places of stages within a step, each from the one before, and weights."""
 LOOSE_TOLERANCE, TIGHT_TOLERANCE = 0.03, 6e-7
 """Tolerances: the first is met most cheaply by the default method as it comes, the second by another one."""
-CALL = 1e-6
+CALL_SECONDS = 1e-6
 """s, of a force call by the clock of these checks."""
 
 
@@ -62,10 +62,10 @@ class Swing:
         """Settings of four methods of one engine: the default has order 2, and one method breaks down at a finer
         step."""
         return [
-            SettingLadder("mujoco", "RK4", STEPS, 4),
-            SettingLadder("mujoco", "midpoint", STEPS, 2, default=STEPS[0]),
-            SettingLadder("mujoco", "Euler", STEPS, 1),
-            SettingLadder("mujoco", "broken", STEPS, 1),
+            SettingLadder("mujoco", "RK4", STEPS_TRIED, 4),
+            SettingLadder("mujoco", "midpoint", STEPS_TRIED, 2, default=STEPS_TRIED[0]),
+            SettingLadder("mujoco", "Euler", STEPS_TRIED, 1),
+            SettingLadder("mujoco", "broken", STEPS_TRIED, 1),
         ]
 
     def reference(self) -> SettingLadder:
@@ -79,11 +79,11 @@ class Swing:
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, np.ndarray, int]:
         """Times and values of the solution, and number of force calls."""
         n = round(duration / setting.value)
-        places, weights = STAGES.get(setting.method, STAGES["Euler"])
+        places, weights = METHOD_STAGES.get(setting.method, METHOD_STAGES["Euler"])
         values = [1.0]
         for i in range(n):
             values.append(_step(i * setting.value, values[-1], setting.value, places, weights))
-        CLOCK.now += CALL * len(places) * n
+        CLOCK.now += CALL_SECONDS * len(places) * n
         times = setting.value * np.arange(n + 1)
         swing = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
         return times, np.array(swing), len(places) * n
@@ -121,7 +121,7 @@ def _fewest_calls(tolerance: float) -> int:
     return min(
         swing.solve(setting, swing.whole)[2]
         for ladder in swing.ladders()
-        for setting in map(ladder.setting, range(len(STEPS)))
+        for setting in map(ladder.setting, range(len(STEPS_TRIED)))
         if _error(setting) <= tolerance
     )
 
@@ -188,10 +188,10 @@ CHECKS = {
 
 
 def _in_module(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
-    return attribute(f"models.advice.price.{module}:{name}", change)
+    return attribute_patch(f"models.advice.price.{module}:{name}", change)
 
 
-def _tenth(original: Any) -> Any:
+def _tenfold_smaller_errors(original: Any) -> Any:
     """Fault: errors of the recommended settings are reported ten times too small."""
 
     def told(*arguments: Any) -> Any:
@@ -209,7 +209,7 @@ def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> Setti
     return max(timed, key=lambda choice: choice.calls, default=None)
 
 
-def _mean(self: ReferenceTruth, other_answer: PricedRun) -> float:
+def _mean_error(self: ReferenceTruth, other_answer: PricedRun) -> float:
     exact = values_at(self.answer, other_answer.times, self.kink_period)
     return float(np.abs(other_answer.values - exact).mean()) if np.isfinite(other_answer.values).all() else np.inf
 
@@ -226,7 +226,11 @@ def _first_rung(
 
 
 FAULTS = (
-    CampaignFault("predicted error a tenth of what was measured", "recommendation", _in_module("_resolved", _tenth)),
+    CampaignFault(
+        "predicted error a tenth of what was measured",
+        "recommendation",
+        _in_module("_resolved", _tenfold_smaller_errors),
+    ),
     CampaignFault(
         "the most accurate setting wins, not the cheapest",
         "recommendation",
@@ -250,7 +254,7 @@ FAULTS = (
         _in_module("_confirmed", lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners)),
     ),
     CampaignFault(
-        "mean difference for the largest", "truth", _in_module("ReferenceTruth.error", lambda _: _mean, "truth")
+        "mean difference for the largest", "truth", _in_module("ReferenceTruth.error", lambda _: _mean_error, "truth")
     ),
     CampaignFault(
         "what is no number left out of the error",

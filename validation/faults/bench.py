@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
-from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks
@@ -26,7 +26,7 @@ from validation.common.checks import (
     momentum_gap,
     order_gap,
     random_states,
-    relative,
+    relative_difference,
     run,
     state_gap,
 )
@@ -36,8 +36,8 @@ SAMPLING_PERIOD = 2e-3
 ORDER_STEP = 2.5e-4
 """Step of the order check (s), where the stiff wheels no longer bend the observed order of RK4."""
 RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
-CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
-ROUNDING = 1e-12
+CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+ROUNDING_BOUND = 1e-12
 
 
 def bench_scene(parameters: str, duration: float) -> Scene:
@@ -63,7 +63,7 @@ class Bench:
     @cached_property
     def road(self) -> Assembly:
         """The vehicle on the study road."""
-        return assemble(bench_scene(self.parameters, self.duration))
+        return assembly_of_scene(bench_scene(self.parameters, self.duration))
 
     @cached_property
     def flat(self) -> Assembly:
@@ -149,10 +149,12 @@ class Check:
     measure: Callable[[Bench, str, Make], float]
 
 
-def _audit(bench: Bench, engine: str, make_engine: Make) -> float:
+def _acceleration_error(bench: Bench, engine: str, make_engine: Make) -> float:
     settings, states = bench.settings(engine), random_states()
     return max(
-        relative(checks.accelerations(make_engine, getattr(bench, name), settings, states), bench.accelerations(name))
+        relative_difference(
+            checks.accelerations(make_engine, getattr(bench, name), settings, states), bench.accelerations(name)
+        )
         for name in ("road", "linear")
     )
 
@@ -161,36 +163,52 @@ def _order(bench: Bench, engine: str, make_engine: Make) -> float:
     return order_gap(make_engine, bench.road, replace(bench.settings(engine), step=ORDER_STEP), bench.truth)
 
 
-def _momentum(bench: Bench, engine: str, make_engine: Make) -> float:
+def _momentum_error(bench: Bench, engine: str, make_engine: Make) -> float:
     return max(momentum_gap(make_engine, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
 
 
-def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
+def _enforced_force_check(situation: str) -> Callable[[Bench, str, Make], float]:
     """A check's function: error of the enforced moment and force, compared with the form in which the pitch is
     eliminated."""
     return lambda bench, engine, make: enforced_gap(
-        make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
+        make,
+        getattr(bench, situation),
+        replace(bench.settings(engine), integrator=CONSTRAINED_INTEGRATORS[engine], step=STEP / 2),
     )
 
 
-def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
+def _path_difference_check(situation: str) -> Callable[[Bench, str, Make], float]:
     """A check's function: largest difference of an engine's path from the reference's."""
     return lambda bench, engine, make: state_gap(
         run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
     )
 
 
-def _rounding(engine: str) -> float:
-    return ROUNDING
+def _rounding_error(engine: str) -> float:
+    return ROUNDING_BOUND
 
 
 CHECKS: dict[str, Check] = {
-    "audit": Check("accelerations at 100 states", "of the largest", _rounding, "rounding of a dozen products", _audit),
-    "road twin": Check("path on the road", "SI", _rounding, "same tableau, same step: rounding", _twin("road")),
-    "linear twin": Check("path under linear forces", "SI", _rounding, "the same", _twin("linear")),
-    "held twin": Check("path under held forces", "SI", _rounding, "the same", _twin("held")),
+    "audit": Check(
+        "accelerations at 100 states",
+        "of the largest",
+        _rounding_error,
+        "rounding of a dozen products",
+        _acceleration_error,
+    ),
+    "road twin": Check(
+        "path on the road", "SI", _rounding_error, "same tableau, same step: rounding", _path_difference_check("road")
+    ),
+    "linear twin": Check(
+        "path under linear forces", "SI", _rounding_error, "the same", _path_difference_check("linear")
+    ),
+    "held twin": Check("path under held forces", "SI", _rounding_error, "the same", _path_difference_check("held")),
     "stabilised twin": Check(
-        "path with an added moment and a dead band", "SI", _rounding, "the same", _twin("stabilised")
+        "path with an added moment and a dead band",
+        "SI",
+        _rounding_error,
+        "the same",
+        _path_difference_check("stabilised"),
     ),
     "order": Check(
         "observed order against the declared one",
@@ -202,36 +220,36 @@ CHECKS: dict[str, Check] = {
     "equilibrium": Check(
         "drift off the static equilibrium",
         "SI",
-        _rounding,
+        _rounding_error,
         "the closed form is exact",
         lambda bench, engine, make: equilibrium_gap(make, bench.flat, bench.settings(engine)),
     ),
     "momentum": Check(
         "vertical momentum against impulse",
         "of weight times time",
-        _rounding,
+        _rounding_error,
         "Runge-Kutta integrates such forces exactly",
-        _momentum,
+        _momentum_error,
     ),
     "moment": Check(
         "enforced moment against the eliminated form",
         "of its rms",
-        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
+        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING_BOUND,
         "generalised-alpha at 0.5 ms leaves 4e-5; MuJoCo's inverse dynamics is exact",
-        _enforced("guided"),
+        _enforced_force_check("guided"),
     ),
     "rails": Check(
         "enforced force and moment against the eliminated form",
         "of their rms",
-        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING,
+        lambda engine: 1e-4 if engine == "exudyn" else ROUNDING_BOUND,
         "the same",
-        _enforced("on_rails"),
+        _enforced_force_check("on_rails"),
     ),
 }
 """What every fault is put to, in the order of the table."""
 
 
-def size(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
+def size_of_error(check: Check, bench: Bench, engine: str, make_engine: Make) -> float:
     """Error that a check measures; infinite where the engine refuses or fails."""
     try:
         return check.measure(bench, engine, make_engine)

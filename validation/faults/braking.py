@@ -13,7 +13,7 @@ import numpy as np
 
 from models.brake import brake, plane_vehicle
 from models.brake.advance import advance
-from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane
 from models.brake.port import sensors
 from models.brake.quarter import QuarterPath, QuarterStop
 from models.brake.surfaces import UNIFORM_ROAD, Road, Stretch, road
@@ -21,18 +21,20 @@ from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
 from validation.braking.braked_truck import RollingTruck, on_road
-from validation.braking.quarter_stops import LITERAL, exact_distance, stopped
+from validation.braking.quarter_stops import LITERAL, exact_distance, stopping_distance
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 
-SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
+SPLIT_ROAD, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
 def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
-    """The truck after one step with all wheels locked, or steered with rolling wheels. On SPLIT the left side is dry
-    and the right side ice; else all is ice."""
-    tables = tyre_table.stacked([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
-    truck = RollingTruck(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, step_function=advance)
+    """The truck after one step with all wheels locked, or steered with rolling wheels. On SPLIT_ROAD the left side is
+    dry and the right side ice; else all is ice."""
+    tables = tyre_table.stacked_tables([stops.friction_table("ice")[0], stops.friction_table("dry")[0]])
+    truck = RollingTruck(
+        on_road(plane_vehicle.plane_of_truck(PAPER_TRUCK), tables, course), 10.0, steer=steer, step_function=advance
+    )
     if not steer:
         truck.turning[:] = 0.0
     truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
@@ -40,23 +42,27 @@ def _first_step(course: Road, steer: float = 0.0) -> RollingTruck:
 
 
 DRY = stops.friction_table("dry")[0]
-LEVEL = stops.steady_torque(stops.FRONT, DRY, 0.004)[1]
+LIGHT_TORQUE = stops.steady_torque(stops.FRONT_WHEEL, DRY, 0.004)[1]
 """Torque (N m) of light braking."""
 
 
-def _light() -> float:
+def _light_stop_error() -> float:
     """Light braking of a quarter vehicle on dry road: relative difference of the stopping distance from the exact
     one."""
-    return abs(stops.stop(stops.FRONT, stops.friction_table("dry"), LEVEL, 11.11).distance / _exact_distance() - 1.0)
+    return abs(
+        stops.constant_torque_stop(stops.FRONT_WHEEL, stops.friction_table("dry"), LIGHT_TORQUE, 11.11).distance
+        / _exact_distance()
+        - 1.0
+    )
 
 
 @cache
 def _exact_distance() -> float:
     """The exact stopping distance (m)."""
-    return exact_distance(stops.FRONT, DRY, LEVEL, 11.11)
+    return exact_distance(stops.FRONT_WHEEL, DRY, LIGHT_TORQUE, 11.11)
 
 
-def _transfer() -> float:
+def _load_transfer_error() -> float:
     """All wheels locked on even friction: relative difference of the front wheels' load from W (b + mu h) / (2 L)."""
     report = _first_step(UNIFORM_ROAD).report
     slide = float(stops.friction_table("ice")[0].mu_x[0, 0, -1])
@@ -65,10 +71,10 @@ def _transfer() -> float:
     return float(np.abs(report.load[:2] / wanted - 1.0).max())
 
 
-def _split() -> float:
+def _split_friction_error() -> float:
     """All wheels locked, dry on the left side only: difference of the yaw acceleration from that by the reported
     forces' moment."""
-    truck = _first_step(SPLIT)
+    truck = _first_step(SPLIT_ROAD)
     x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
     moment = float(x @ truck.report.force_y - y @ truck.report.force_x)
     return float(abs(truck.state[1, 2] / (STEP * moment / 25000.0) - 1.0))
@@ -82,15 +88,15 @@ def _turns_left() -> float:
 
 def _pulls_left() -> float:
     """The left side is dry: 1 if the truck does not yaw to the left."""
-    return float(not _first_step(SPLIT).state[1, 2] > 0.0)
+    return float(not _first_step(SPLIT_ROAD).state[1, 2] > 0.0)
 
 
-def _loop() -> float:
+def _hysteresis_area_error() -> float:
     """Relative error of the area of a brake's hysteresis loop from 0 to 5 bar and back, compared with the closed
     form."""
     brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
-    torques = brake.torques(pressures, brakes)
+    torques = brake.torques_of_pressures(pressures, brakes)
     top, down = 1400.0 * 4.2, 1500.0
     left = 0.3 + top / down
     wanted = 0.5 * top * (left - 0.3) + top * (5.0 - left) - 0.5 * top * 4.2
@@ -102,9 +108,9 @@ def _push_out() -> float:
     return float(brake.torque(0, 0.7, 0.0, brake.of_wheels(brake.PAPER_FRONT)))
 
 
-def _nodes() -> float:
+def _table_node_error() -> float:
     """Difference between the stacked friction table at its nodes and the tyre's own table."""
-    tables = tyre_table.stacked([DRY])
+    tables = tyre_table.stacked_tables([DRY])
     return float(np.abs(np.interp(DRY.slips, tables.slips, tables.mu_x[0, 0, 0]) - DRY.mu_x[0, 0]).max())
 
 
@@ -114,7 +120,7 @@ def _distance_at_steady_slip() -> float:
     return float(wheels.steady_slip_case(wheels.DRY, 0.02)("reference", Path()))
 
 
-def _code() -> float:
+def _converter_error() -> float:
     """Largest error of a ramp converted to 12 bits, compared with half a code; in units of this."""
     ramp = np.linspace(0.0, 30.0, 100_001)
     channels = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
@@ -122,68 +128,69 @@ def _code() -> float:
 
 
 CHECKS = {
-    "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light),
+    "light stop": Check("stopping distance, light braking, exact", "relative", 5e-4, _light_stop_error),
     "slip that stays": Check(
         "stopping distance at a slip that stays, closed form", "relative", 1e-6, _distance_at_steady_slip
     ),
-    "code": Check("largest error of converted signals, half a code", "relative", 1e-3, _code),
-    "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _transfer),
-    "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split),
+    "code": Check("largest error of converted signals, half a code", "relative", 1e-3, _converter_error),
+    "transfer": Check("front loads of the locked truck, closed form", "relative", 1e-6, _load_transfer_error),
+    "split": Check("yaw acceleration on split friction by its moment", "relative", 1e-6, _split_friction_error),
     "turns left": Check("sign of yaw and roll in a left turn", "", 0.5, _turns_left),
     "pulls left": Check("sign of yaw on split friction", "", 0.5, _pulls_left),
-    "loop": Check("area of a brake's loop, closed form", "relative", 1e-3, _loop),
+    "loop": Check("area of a brake's loop, closed form", "relative", 1e-3, _hysteresis_area_error),
     "push-out": Check("torque below push-out", "N m", 1e-9, _push_out),
-    "nodes": Check("tables at the tyre's own nodes", "", 1e-12, _nodes),
+    "nodes": Check("tables at the tyre's own nodes", "", 1e-12, _table_node_error),
 }
 
 
-def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _truck_patch(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Patch that changes the numbers of every truck."""
-    return attribute(
-        "models.brake.plane_vehicle:truck", lambda real: lambda *arguments: _changed(real(*arguments), change)
+    return attribute_patch(
+        "models.brake.plane_vehicle:plane_of_truck",
+        lambda real: lambda *arguments: _changed_plane(real(*arguments), change),
     )
 
 
-def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
+def _changed_plane(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
     parts: dict[str, Any] = {name: of(getattr(plane, name)) for name, of in change.items()}
     return plane._replace(**parts)
 
 
-def _brakes(change: Callable[[Any], Any]) -> Patch:
-    return attribute("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
+def _brakes_patch(change: Callable[[Any], Any]) -> Patch:
+    return attribute_patch("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
 
 
 def _force_of_step_start(original: Any) -> Any:
     """Fault: each step of the vehicle uses the tyre force at the step's start."""
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
-        way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
+        way = stopping_distance(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
         none = np.zeros(2)
         return QuarterStop(QuarterPath(none, np.array([0.0, way]), np.array([speed, 0.0]), none, none), 1)
 
     return stop
 
 
-def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _tables_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     def stacked(original: Any) -> Any:
         return lambda tables: (lambda of: of._replace(mu_x=np.ascontiguousarray(change(of.mu_x))))(original(tables))
 
-    return attribute("models.tyre.tyre_table:stacked", stacked)
+    return attribute_patch("models.tyre.tyre_table:stacked_tables", stacked)
 
 
-def _mirrored(original: Any) -> Any:
+def _mirrored_steering(original: Any) -> Any:
     """Fault: steer angles, and thus the slip angles of steered wheels, have the opposite sign."""
     return lambda motion, torques, step, steer, vehicle: original(motion, torques, step, -steer, vehicle)
 
 
-def _spin(factor: float) -> Patch:
+def _spin_inertia_patch(factor: float) -> Patch:
     """Fault: the spin inertia of the quarter vehicle's wheel is changed in the time step, but not in the closed
     form."""
 
     def change(original: Any) -> Any:
-        return property(lambda truck: _changed(original.fget(truck), {"spin": lambda spin: factor * spin}))
+        return property(lambda truck: _changed_plane(original.fget(truck), {"spin": lambda spin: factor * spin}))
 
-    return attribute("models.brake.quarter:Quarter.plane", change)
+    return attribute_patch("models.brake.quarter:Quarter.plane", change)
 
 
 def _one_bit_less(original: Any) -> Any:
@@ -195,32 +202,42 @@ FAULTS = (
     CampaignFault(
         "force of the start of the step",
         "step",
-        attribute("validation.braking.quarter_stops:stop", _force_of_step_start),
+        attribute_patch("validation.braking.quarter_stops:constant_torque_stop", _force_of_step_start),
     ),
-    CampaignFault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
-    CampaignFault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
-    CampaignFault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),
-    CampaignFault("track halved", "vehicle", _truck(place=lambda p: p * np.array([1.0, 0.5]))),
-    CampaignFault("yaw inertia 1 % too large", "vehicle", _truck(inertias=lambda own: 1.01 * own)),
+    CampaignFault("load transfer with the other sign", "vehicle", _truck_patch(by_x=np.negative)),
+    CampaignFault("roll transfer with the other sign", "vehicle", _truck_patch(by_y=np.negative)),
+    CampaignFault("left and right swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, -1.0]))),
+    CampaignFault("track halved", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, 0.5]))),
+    CampaignFault("yaw inertia 1 % too large", "vehicle", _truck_patch(inertias=lambda own: 1.01 * own)),
     CampaignFault(
         "height of the centre of mass 1 % too large",
         "vehicle",
-        _truck(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own),
+        _truck_patch(by_x=lambda own: 1.01 * own, by_y=lambda own: 1.01 * own),
     ),
-    CampaignFault("spin inertia 1 % too large", "wheel", _spin(1.01)),
-    CampaignFault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
-    CampaignFault("conversion with a bit less", "port", attribute("models.brake.port.sensors:Channels", _one_bit_less)),
-    CampaignFault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
-    CampaignFault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
+    CampaignFault("spin inertia 1 % too large", "wheel", _spin_inertia_patch(1.01)),
     CampaignFault(
-        "hysteresis reversed", "brake", _brakes(lambda own: own._replace(release=own.push_out, push_out=own.release))
+        "slip angle with the other sign",
+        "tyre",
+        attribute_patch("validation.faults.braking:advance", _mirrored_steering),
     ),
-    CampaignFault("push-out pressure ignored", "brake", _brakes(lambda own: own._replace(push_out=0.0 * own.push_out))),
     CampaignFault(
-        "falling pressure by the rising gradient", "brake", _brakes(lambda own: own._replace(falling=own.rising))
+        "conversion with a bit less", "port", attribute_patch("models.brake.port.sensors:Channels", _one_bit_less)
     ),
-    CampaignFault("friction read one node late", "tyre", _tables(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
-    CampaignFault("friction 1 % too large", "tyre", _tables(lambda mu: 1.01 * mu)),
+    CampaignFault("front and rear swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([-1.0, 1.0]))),
+    CampaignFault("hysteresis without a width", "brake", _brakes_patch(lambda own: own._replace(release=own.push_out))),
+    CampaignFault(
+        "hysteresis reversed",
+        "brake",
+        _brakes_patch(lambda own: own._replace(release=own.push_out, push_out=own.release)),
+    ),
+    CampaignFault(
+        "push-out pressure ignored", "brake", _brakes_patch(lambda own: own._replace(push_out=0.0 * own.push_out))
+    ),
+    CampaignFault(
+        "falling pressure by the rising gradient", "brake", _brakes_patch(lambda own: own._replace(falling=own.rising))
+    ),
+    CampaignFault("friction read one node late", "tyre", _tables_patch(lambda mu: np.roll(mu, 1, axis=3) * (mu > 0.0))),
+    CampaignFault("friction 1 % too large", "tyre", _tables_patch(lambda mu: 1.01 * mu)),
 )
 
 CAMPAIGN = Campaign("planted.braking", "braking", "anti-lock", CHECKS, FAULTS)

@@ -19,46 +19,53 @@ from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
 from validation.braking.compiled_brakes import wheel_forces_in
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 
-ENGINE, COUNT, DURATION = "exudyn", 20, 0.05
+ENGINE, STATES_COMPARED, DURATION = "exudyn", 20, 0.05
 """Engine, whose steps Python calls, so that they can be patched; states; s of a stop."""
-BOUND = 1e-10
+DIFFERENCE_BOUND = 1e-10
 
 
-def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60) -> Callable[[], float]:
+def _law_difference_check(
+    sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60
+) -> Callable[[], float]:
     """Check's function: largest difference between compiled and plain code at ``count`` states."""
     return lambda: laws.largest_difference(*sides(count))
 
 
 def _accelerations() -> float:
     """Largest difference between the accelerations of both codes for a vehicle that is built with the fault."""
-    accelerations = whole.accelerations(whole.car_with_stops.__wrapped__(), ENGINE, COUNT)
-    return whole.relative_difference(accelerations, whole.plain_accelerations("bent", COUNT))
+    accelerations = whole.accelerations(whole.car_with_stops.__wrapped__(), ENGINE, STATES_COMPARED)
+    return whole.relative_difference(accelerations, whole.plain_accelerations("bent", STATES_COMPARED))
 
 
-def _stop() -> float:
+def _stop_difference() -> float:
     return whole.paths_apart(
         whole.run(whole.car_with_stops.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION)
     )
 
 
-def _lagging() -> float:
+def _lagging_difference() -> float:
     path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
     return whole.paths_apart(path, whole.plain_run("car", DURATION, lags=True))
 
 
 CHECKS = {
     "accelerations": Check("accelerations at random states beside plain code", "by the largest", 1e-12, _accelerations),
-    "stop": Check("a piece of a stop beside plain code", "m, rad, per s", BOUND, _stop),
-    "lagging": Check("the same on tyres that lag", "m, rad, per s", BOUND, _lagging),
-    "friction": Check("friction by stacked tables", "by the largest", 1e-12, _law(laws.frictions)),
-    "tyre": Check("a braked wheel over a step", "by the largest", 1e-12, _law(laws.tyre_reports)),
-    "road": Check("surfaces under the wheels", "by the largest", 1e-12, _law(laws.surfaces)),
-    "pressure": Check(
-        "pressures and torques along commands", "by the largest", 1e-12, _law(laws.torques_by_commands, 20)
+    "stop": Check("a piece of a stop beside plain code", "m, rad, per s", DIFFERENCE_BOUND, _stop_difference),
+    "lagging": Check("the same on tyres that lag", "m, rad, per s", DIFFERENCE_BOUND, _lagging_difference),
+    "friction": Check(
+        "friction by stacked tables", "by the largest", 1e-12, _law_difference_check(laws.friction_of_random_states)
     ),
-    "relaxation": Check("slip angles that lag", "by the largest", 1e-12, _law(laws.slip_lags)),
+    "tyre": Check("a braked wheel over a step", "by the largest", 1e-12, _law_difference_check(laws.tyre_reports)),
+    "road": Check("surfaces under the wheels", "by the largest", 1e-12, _law_difference_check(laws.random_surfaces)),
+    "pressure": Check(
+        "pressures and torques along commands",
+        "by the largest",
+        1e-12,
+        _law_difference_check(laws.torques_by_commands, 20),
+    ),
+    "relaxation": Check("slip angles that lag", "by the largest", 1e-12, _law_difference_check(laws.slip_lags)),
 }
 
 
@@ -73,10 +80,10 @@ def _table(change: Callable[[Handling], None]) -> Patch:
 
         return make
 
-    return attribute("models.brake.sprung:Handling", packed)
+    return attribute_patch("models.brake.sprung:Handling", packed)
 
 
-def _rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
+def _section_rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
     """View of the rows (count, width) of one section of the car's table; ``first`` and ``count`` are the places in the
     table's head that hold its start and number of rows."""
     begin, rows = int(handling.numbers[first]), int(handling.numbers[count])
@@ -84,10 +91,10 @@ def _rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
 
 
 def _rows_of_parts(handling: Handling) -> np.ndarray:
-    return _rows(handling, at.OF_PARTS, at.PARTS, PER_PART)
+    return _section_rows(handling, at.OF_PARTS, at.PARTS, PER_PART)
 
 
-def _exchanged(handling: Handling) -> None:
+def _exchange_spring_numbers(handling: Handling) -> None:
     """Fault: stiffness and damping of the first spring are exchanged."""
     first = _rows_of_parts(handling)[0]
     first[[STIFFNESS, DAMPING]] = first[[DAMPING, STIFFNESS]]
@@ -97,14 +104,14 @@ def _without_bars(handling: Handling) -> None:
     _rows_of_parts(handling)[len(handling.vehicle.springs) :, STIFFNESS] = 0.0
 
 
-def _neighbour(handling: Handling) -> None:
+def _shift_stiffnesses(handling: Handling) -> None:
     """Fault: every spring has the stiffness of the one before it in the table."""
     parts = _rows_of_parts(handling)
     parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
 
 
 def _moved_point(handling: Handling) -> None:
-    _rows(handling, at.OF_POINTS, at.POINTS, PER_POINT)[0, LOCAL] += 0.01
+    _section_rows(handling, at.OF_POINTS, at.POINTS, PER_POINT)[0, LOCAL] += 0.01
 
 
 def _softer_tyre(handling: Handling) -> None:
@@ -115,20 +122,20 @@ def _damped_tyre(handling: Handling) -> None:
     handling.tyre_numbers(1)[at.VISCOUS] *= 1.3
 
 
-def _smooth(handling: Handling) -> None:
+def _remove_dry_friction(handling: Handling) -> None:
     _rows_of_parts(handling)[:, FRICTION] = 0.0
 
 
-def _straight(handling: Handling) -> None:
+def _remove_curves(handling: Handling) -> None:
     _rows_of_parts(handling)[:, ON_TRAVEL] = 0.0
 
 
-def _dragged(handling: Handling) -> None:
+def _double_drag(handling: Handling) -> None:
     handling.numbers[at.DRAG] *= 2.0
 
 
-def _preloads(change: Callable[[Preloads], Preloads]) -> Patch:
-    return attribute("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
+def _preload_patch(change: Callable[[Preloads], Preloads]) -> Patch:
+    return attribute_patch("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
 
 
 def _first_larger(values: dict[str, float]) -> dict[str, float]:
@@ -137,12 +144,12 @@ def _first_larger(values: dict[str, float]) -> dict[str, float]:
     return values | {name: 1.01 * values[name]}
 
 
-def _march(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
+def _march_patch(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
     """Patch of an engine's step under constant tyre forces; change(step, engine, q, v) replaces it."""
-    return attribute("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
+    return attribute_patch("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
 
 
-def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
+def _euler_step(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
     """Fault: the engine makes a step with the accelerations at its start (explicit Euler)."""
     rates = engine.acceleration(0.0, q, v)
     q += engine.step * v
@@ -151,7 +158,7 @@ def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
 
 
 def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
-    wheel_forces_in(engine.numbers).spun[:] *= 1.01
+    wheel_forces_in(engine.numbers).spin_moments[:] *= 1.01
     return march(engine, *state)
 
 
@@ -162,13 +169,13 @@ def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
     return march(engine, *state)
 
 
-def _stacked(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
+def _stacked_tables_patch(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
     """Patch that gives the stacked friction tables for compiled code other mu_x and h."""
 
     def stack(original: Any) -> Any:
         return lambda tyres: _with_friction(original(tyres), change)
 
-    return attribute("validation.braking.plain_brakes:stacked", stack)
+    return attribute_patch("validation.braking.plain_brakes:stacked_tables", stack)
 
 
 def _with_friction(tables: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
@@ -232,9 +239,9 @@ def _longer_relaxation(original: Any) -> Any:
     return lambda state, time, steer, slope, length, lag: original(state, time, steer, slope, 1.01 * length, lag)
 
 
-def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
+def _relaxation_patch(change: Callable[..., tuple[Any, ...]]) -> Patch:
     """Patch that changes how the slip lag of tyres is advanced on a suspension."""
-    return attribute("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
+    return attribute_patch("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
 
 
 def _half_as_far(contacts: Any, half: float, *rest: Any) -> tuple[Any, ...]:
@@ -244,44 +251,62 @@ def _half_as_far(contacts: Any, half: float, *rest: Any) -> tuple[Any, ...]:
     return contacts, half, *rest
 
 
-def _faster(contacts: Any, *rest: Any) -> tuple[Any, ...]:
+def _faster_lag(contacts: Any, *rest: Any) -> tuple[Any, ...]:
     """Fault: the lag is advanced by speeds along the wheels that are 1 % too large."""
     return contacts._replace(along=1.01 * contacts.along), *rest
 
 
-BENCH, COMPILED = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
+PLAIN_BENCH_MODULE, COMPILED_MODULE = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
 FAULTS = (
     CampaignFault(
-        "preload of a spring 1 % too large", "vehicle", _preloads(lambda p: p._replace(parts=_first_larger(p.parts)))
+        "preload of a spring 1 % too large",
+        "vehicle",
+        _preload_patch(lambda p: p._replace(parts=_first_larger(p.parts))),
     ),
     CampaignFault(
-        "static load of a tyre 1 % too large", "vehicle", _preloads(lambda p: p._replace(tyres=_first_larger(p.tyres)))
+        "static load of a tyre 1 % too large",
+        "vehicle",
+        _preload_patch(lambda p: p._replace(tyres=_first_larger(p.tyres))),
     ),
-    CampaignFault("stiffness and damping of a spring exchanged", "table", _table(_exchanged)),
-    CampaignFault("stiffness of a spring's neighbour", "table", _table(_neighbour)),
+    CampaignFault("stiffness and damping of a spring exchanged", "table", _table(_exchange_spring_numbers)),
+    CampaignFault("stiffness of a spring's neighbour", "table", _table(_shift_stiffnesses)),
     CampaignFault("anti-roll bars without stiffness", "table", _table(_without_bars)),
     CampaignFault("a spring's point 10 mm ahead", "table", _table(_moved_point)),
-    CampaignFault("springs without dry friction", "table", _table(_smooth)),
-    CampaignFault("springs without curves of travel", "table", _table(_straight)),
-    CampaignFault("drag twice as large", "table", _table(_dragged)),
+    CampaignFault("springs without dry friction", "table", _table(_remove_dry_friction)),
+    CampaignFault("springs without curves of travel", "table", _table(_remove_curves)),
+    CampaignFault("drag twice as large", "table", _table(_double_drag)),
     CampaignFault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
     CampaignFault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
     CampaignFault(
-        "brake torque of the step's start", "step", attribute("models.brake.samples:by_valves", _late_torque)
+        "brake torque of the step's start", "step", attribute_patch("models.brake.samples:by_valves", _late_torque)
     ),
-    CampaignFault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
-    CampaignFault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
-    CampaignFault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
-    CampaignFault("slip angles that lag over half of each step", "lagging", _relaxed(_half_as_far)),
-    CampaignFault("slip angles that lag by a speed 1 % too large", "lagging", _relaxed(_faster)),
-    CampaignFault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
-    CampaignFault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
-    CampaignFault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),
-    CampaignFault("friction along the wheel 1 % too large", "tyre", _stacked(lambda t: (1.01 * t.mu_x, t.h))),
-    CampaignFault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
-    CampaignFault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
-    CampaignFault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
-    CampaignFault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer_relaxation)),
+    CampaignFault("Euler's step for Runge and Kutta's", "step", _march_patch(_euler_step)),
+    CampaignFault("moment on turning wheels 1 % too large", "step", _march_patch(_spun_more)),
+    CampaignFault("forces of the front tyres exchanged", "step", _march_patch(_forces_exchanged)),
+    CampaignFault("slip angles that lag over half of each step", "lagging", _relaxation_patch(_half_as_far)),
+    CampaignFault("slip angles that lag by a speed 1 % too large", "lagging", _relaxation_patch(_faster_lag)),
+    CampaignFault(
+        "brake torque 1 % too large", "brake", attribute_patch("models.brake.samples:by_valves", _more_torque)
+    ),
+    CampaignFault(
+        "valves that answer at once", "brake", attribute_patch(f"{PLAIN_BENCH_MODULE}:by_valves", _quick_valves)
+    ),
+    CampaignFault("cornering stiffness 30 % too large", "tyre", _stacked_tables_patch(lambda t: (t.mu_x, 1.3 * t.h))),
+    CampaignFault(
+        "friction along the wheel 1 % too large", "tyre", _stacked_tables_patch(lambda t: (1.01 * t.mu_x, t.h))
+    ),
+    CampaignFault(
+        "loads packed one node late", "tyre", _stacked_tables_patch(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))
+    ),
+    CampaignFault(
+        "inertia of a wheel 1 % too large", "wheel", attribute_patch(f"{COMPILED_MODULE}:tyre", _heavy_wheel)
+    ),
+    CampaignFault(
+        "shares of two stretches exchanged", "road", attribute_patch(f"{COMPILED_MODULE}:under_wheels", _other_share)
+    ),
+    CampaignFault(
+        "relaxation length 1 % too long", "tyre", attribute_patch(f"{COMPILED_MODULE}:lag_on", _longer_relaxation)
+    ),
 )
 
 CAMPAIGN = Campaign("planted.braking_reference", "braking on the suspension", "anti-lock", CHECKS, FAULTS)

@@ -13,7 +13,7 @@ from validation.common.rows import Observed, Row, System, Table
 from validation.faults.patches import Patch
 
 Record = dict[str, Any]
-SYSTEM: System = "hard-cases"
+FAULT_SYSTEM: System = "hard-cases"
 """Where the report has all rows of planted faults; a campaign's own system is that of the thing that they are in."""
 
 
@@ -57,7 +57,7 @@ class Campaign:
     def measure(self, every: int = 1) -> list[Record]:
         """Ratio of error to tolerance for every check: first without a fault, then with each planted fault, or with
         every ``every``-th one."""
-        clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
+        clean = {"fault": "no fault", "place": "nowhere", "ratios": self._error_ratios()}
         planted = self.faults[::every]
         return [
             clean,
@@ -69,9 +69,9 @@ class Campaign:
 
     def _ratios_with_fault(self, fault: CampaignFault) -> dict[str, float]:
         with fault.inside()():
-            return self._ratios()
+            return self._error_ratios()
 
-    def _ratios(self) -> dict[str, float]:
+    def _error_ratios(self) -> dict[str, float]:
         return {name: check.size() / check.tolerance for name, check in self.checks.items()}
 
     def rows(self, records: list[Record]) -> list[Row]:
@@ -83,7 +83,7 @@ class Campaign:
         return [
             Observed(
                 f"{self.id}.caught",
-                SYSTEM,
+                FAULT_SYSTEM,
                 f"faults planted in {self.what} that a check catches",
                 sum(bool(seeing_checks(record)) for record in faulty),
                 "faults",
@@ -95,14 +95,14 @@ class Campaign:
             ),
             Observed(
                 f"{self.id}.false_alarms",
-                SYSTEM,
+                FAULT_SYSTEM,
                 f"false alarms of the checks of {self.what} (no fault planted)",
                 len(seeing_checks(clean)),
                 "alarms",
             ).within(0, 0, "a check that cries without a fault is no check", "native"),
             Observed(
                 f"{self.id}.single",
-                SYSTEM,
+                FAULT_SYSTEM,
                 f"faults planted in {self.what} that a single check catches",
                 len(single),
                 "faults",
@@ -115,7 +115,7 @@ class Campaign:
             (
                 record["fault"],
                 record["place"],
-                self._sizes(record),
+                self._sizes_text(record),
                 ", ".join(name for name in self.checks if name not in seeing_checks(record)),
             )
             for record in records[1:]
@@ -142,7 +142,7 @@ class Campaign:
             for record in records[1:]
         ]
 
-    def _sizes(self, record: Record) -> str:
+    def _sizes_text(self, record: Record) -> str:
         return ", ".join(
             f"{name} {record['ratios'][name] * self.checks[name].tolerance:.1g}" for name in seeing_checks(record)
         )

@@ -23,7 +23,7 @@ def vehicle(change: Callable[[Vehicle], Vehicle]) -> Change:
     return lambda assembly: replace(assembly, vehicle=change(assembly.vehicle))
 
 
-def struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
+def replaced_struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
     """Fault: change(strut, struts) replaces each strut; it knows all struts of the vehicle by name."""
 
     def changed(original: Vehicle) -> Vehicle:
@@ -62,19 +62,19 @@ def _point_moved_to(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
-def swapped(first: str, other_strut: str) -> Change:
+def swapped_struts(first: str, other_strut: str) -> Change:
     """Fault: stiffness and damping of two struts are exchanged."""
 
     def change(strut: Strut, struts: dict[str, Strut]) -> Strut:
         source = struts.get({first: other_strut, other_strut: first}.get(strut.name, strut.name), strut)
         return replace(strut, stiffness=source.stiffness, damping=source.damping)
 
-    return struts(change)
+    return replaced_struts(change)
 
 
-def stiffened(name: str, factor: float) -> Change:
+def stiffened_strut(name: str, factor: float) -> Change:
     """Fault: the stiffness of one strut is multiplied by a factor."""
-    return struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
+    return replaced_struts(lambda s, named: replace(s, stiffness=factor * s.stiffness) if s.name == name else s)
 
 
 def undamped_tyre(strut: Strut, struts: dict[str, Strut]) -> Strut:
@@ -166,7 +166,7 @@ class OtherTrack(AlteredSignal):
         return replace(self.signal, profile=iso8608_road("A", 1))
 
 
-def driven(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
+def replaced_input(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
     """Fault: the input signal is replaced, if the vehicle is driven in one of the modes."""
 
     def changed(assembly: Assembly) -> Assembly:
@@ -177,12 +177,12 @@ def driven(modes: tuple[str, ...], change: Callable[[Any], Any]) -> Change:
     return changed
 
 
-def channels(modes: tuple[str, ...], change: Values) -> Change:
+def replaced_channels(modes: tuple[str, ...], change: Values) -> Change:
     """Fault: the input's values are replaced by change(values)."""
-    return driven(modes, lambda signal: AlteredSignal(signal, 0.0, change))
+    return replaced_input(modes, lambda signal: AlteredSignal(signal, 0.0, change))
 
 
-def times(factors: dict[int, float]) -> Values:
+def multiplied_channels(factors: dict[int, float]) -> Values:
     """Function that multiplies some channels, given by number, by a factor; other channels stay."""
 
     def change(values: np.ndarray) -> np.ndarray:
@@ -194,7 +194,7 @@ def times(factors: dict[int, float]) -> Values:
     return change
 
 
-def springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
+def replaced_springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
     """Fault: every pitch spring is replaced."""
     return vehicle(
         lambda original: replace(original, pitch_springs=tuple(change(spring) for spring in original.pitch_springs))
@@ -220,12 +220,14 @@ def moment(periods: float, change: Values = lambda values: values) -> Change:
 
 def with_late_input(periods: float, step: float = 1e-3) -> Change:
     """Fault: the input is delayed by a fraction of its sampling period, or of a 1 ms step if it is not sampled."""
-    return driven(("road", "force", "pitch"), lambda signal: AlteredSignal(signal, periods * (signal.period or step)))
+    return replaced_input(
+        ("road", "force", "pitch"), lambda signal: AlteredSignal(signal, periods * (signal.period or step))
+    )
 
 
 def road(**factors: float) -> Change:
     """Fault: numbers of the road signal (speed, wheelbase) are multiplied by a factor."""
-    return driven(
+    return replaced_input(
         ("road",),
         lambda signal: replace(signal, **{name: factor * getattr(signal, name) for name, factor in factors.items()}),
     )

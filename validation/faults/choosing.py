@@ -20,12 +20,12 @@ from validation.choice.drawn_scenes import ChoiceQuestion
 from validation.choice.drawn_scenes import draw_scene as drawn_run
 from validation.choice.judged import JudgedByRuns, asked_speeds, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import attribute
-from validation.ride.drawn_rides import DrawnRide, drawn
+from validation.faults.patches import attribute_patch
+from validation.ride.drawn_rides import DrawnRide, drawn_ride
 
-SEED, RUN = 61, 4
+SEED, HALF_CAR_SEED = 61, 4
 """Of the linear scene, and of the half car that is run."""
-DRAWS = 32
+DRAWN_RIDES = 32
 """Random parameters at which the linear choice is looked at."""
 
 TOLERANCE = 1e-3
@@ -33,13 +33,13 @@ TOLERANCE = 1e-3
 
 
 @cache
-def _linear() -> DrawnRide:
-    return drawn(SEED)
+def _linear_ride() -> DrawnRide:
+    return drawn_ride(SEED)
 
 
 @cache
 def _run() -> ChoiceQuestion:
-    run = drawn_run("pitch-plane", RUN)
+    run = drawn_run("pitch-plane", HALF_CAR_SEED)
     return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
 
 
@@ -47,20 +47,20 @@ def _by_frequency() -> tuple[RideChoice, np.ndarray, float]:
     """The choice for the linear scene with the functions that are in place now (faulty or not), its changes
     (quantities,) by frequency responses, and the largest change near the scene."""
     return _linear_choice_with_functions(
-        LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted
+        LinearChooser.__init__, LinearChooser.confirmed_changes, LinearChooser.off, LinearScreen.predicted_variances
     )
 
 
-def _by_runs() -> JudgedByRuns:
+def _choice_by_runs() -> JudgedByRuns:
     """The choice by runs for the half car, judged by two further runs."""
-    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.shares)
+    return _choice_with_functions(Chooser.__init__, Chooser.confirm, Screen.relative_changes)
 
 
 @cache
 def _linear_choice_with_functions(*functions: Any) -> tuple[RideChoice, np.ndarray, float]:
-    chooser = asked_speeds(_linear())
+    chooser = asked_speeds(_linear_ride())
     choice = chooser.choose()
-    nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWS, DRAWS) * chooser.tolerance
+    nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWN_RIDES, DRAWN_RIDES) * chooser.tolerance
     return choice, changes_by_frequency(chooser, choice), nearby
 
 
@@ -72,48 +72,48 @@ def _choice_with_functions(*functions: Any) -> JudgedByRuns:
 def _variances() -> float:
     """Largest difference of the reported changes from those by sums over frequencies."""
     choice, by_frequency, _ = _by_frequency()
-    return float(np.abs(by_frequency - choice.confirmed).max())
+    return float(np.abs(by_frequency - choice.confirmed_change).max())
 
 
 def _reported_change() -> float:
     """Ratio of the largest change by frequency responses to the tolerance, if the choice is reported as within it."""
     choice, by_frequency, _ = _by_frequency()
-    return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear().tolerance
+    return choice.within_tolerance * float(np.abs(by_frequency).max()) / _linear_ride().tolerance
 
 
-def _predicted() -> float:
+def _prediction_difference() -> float:
     """Largest difference in octaves between predicted changes and those by frequency responses; infinite if the sign is
     wrong."""
     choice, by_frequency, _ = _by_frequency()
     with np.errstate(invalid="ignore", divide="ignore"):
-        octaves = np.abs(np.log2(choice.predicted / by_frequency)).max()
+        octaves = np.abs(np.log2(choice.predicted_change / by_frequency)).max()
     return float(np.nan_to_num(octaves, nan=np.inf))
 
 
 def _unreported_change() -> float:
     """Ratio of the largest change at random speeds and parameters to the largest change that is reported."""
     choice, _, nearby = _by_frequency()
-    return nearby / float(np.abs(choice.off).max())
+    return nearby / float(np.abs(choice.change_with_parameters_off).max())
 
 
-def _runs() -> float:
+def _reported_difference() -> float:
     """Largest difference of the reported changes of a half car from those by two further runs."""
-    by_runs = _by_runs()
-    return float(np.abs(by_runs.again - by_runs.choice.confirmed).max())
+    by_runs = _choice_by_runs()
+    return float(np.abs(by_runs.repeated_changes - by_runs.choice.confirmed_change).max())
 
 
 def _runs_kept() -> float:
     """Ratio of the largest change by two further runs to the tolerance, if the choice is reported as within it."""
-    by_runs = _by_runs()
-    return by_runs.choice.within_tolerance * float(by_runs.again.max()) / _run().tolerance
+    by_runs = _choice_by_runs()
+    return by_runs.choice.within_tolerance * float(by_runs.repeated_changes.max()) / _run().tolerance
 
 
 CHECKS = {
     "frequencies": Check("quarter car: confirmed changes, spectra summed", "of a deviation", 1e-6, _variances),
     "tolerance": Check("quarter car: its change by the tolerance asked for", "times", 1.01, _reported_change),
-    "predictions": Check("quarter car: predictions by the changes", "octaves", 1.0, _predicted),
+    "predictions": Check("quarter car: predictions by the changes", "octaves", 1.0, _prediction_difference),
     "nearby": Check("quarter car: its change nearby by the largest one reported", "times", 1.01, _unreported_change),
-    "two runs": Check("half car: confirmed changes, run once more", "of a deviation", 1e-9, _runs),
+    "two runs": Check("half car: confirmed changes, run once more", "of a deviation", 1e-9, _reported_difference),
     "tolerance of runs": Check("half car: its change by the tolerance asked for", "times", 1.0, _runs_kept),
 }
 
@@ -134,7 +134,7 @@ def _any_tolerance(original: Any) -> Any:
     return init
 
 
-def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
+def _unconfirmed_report(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> Callable[[Any], Any]:
     """Fault: predicted changes are reported as confirmed without a run."""
 
     def confirm(chooser: Chooser, omitted_effects: frozenset[str]) -> np.ndarray:
@@ -146,47 +146,62 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
     return lambda real: confirm
 
 
-LINEAR, RUNS = "models.advice.ride_choice", "models.advice.choice"
+LINEAR_MODULES, RUN_MODULES = "models.advice.ride_choice", "models.advice.choice"
 FAULTS = (
     CampaignFault(
         "sign of the predicted change",
         "screen of linear scenes",
-        attribute(f"{LINEAR}.screen:Screen.predicted", _other_sign),
+        attribute_patch(f"{LINEAR_MODULES}.screen:Screen.predicted_variances", _other_sign),
     ),
     CampaignFault(
         "predictions reported as confirmed",
         "choice of linear scenes",
-        attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: own.predicted(chosen)),
+        attribute_patch(
+            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes",
+            lambda real: lambda own, chosen: own.predicted_changes(chosen),
+        ),
     ),
     CampaignFault(
         "confirmed against itself",
         "choice of linear scenes",
-        attribute(f"{LINEAR}.choose:Chooser.confirm", lambda real: lambda own, chosen: 0.0 * own.full[0]),
+        attribute_patch(
+            f"{LINEAR_MODULES}.choose:Chooser.confirmed_changes", lambda real: lambda own, chosen: 0.0 * own.full[0]
+        ),
     ),
     CampaignFault(
-        "tolerance ignored", "choice of linear scenes", attribute(f"{LINEAR}.choose:Chooser.__init__", _any_tolerance)
+        "tolerance ignored",
+        "choice of linear scenes",
+        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.__init__", _any_tolerance),
     ),
     CampaignFault(
         "parameters that are off taken as they stand",
         "choice of linear scenes",
-        attribute(f"{LINEAR}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen)),
+        attribute_patch(f"{LINEAR_MODULES}.choose:Chooser.off", lambda real: lambda own, chosen: own.between(chosen)),
     ),
     CampaignFault(
         "predictions reported as confirmed",
         "choice by runs",
-        attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, chosen, times: own.told(chosen, times))),
+        attribute_patch(
+            f"{RUN_MODULES}.choose:Chooser.confirm",
+            _unconfirmed_report(lambda own, chosen, times: own.told(chosen, times)),
+        ),
     ),
     CampaignFault(
         "confirmed against itself",
         "choice by runs",
-        attribute(f"{RUNS}.choose:Chooser.confirm", _reported(lambda own, *_: np.zeros(len(own.whole.quantities)))),
+        attribute_patch(
+            f"{RUN_MODULES}.choose:Chooser.confirm",
+            _unconfirmed_report(lambda own, *_: np.zeros(len(own.whole.quantities))),
+        ),
     ),
-    CampaignFault("tolerance ignored", "choice by runs", attribute(f"{RUNS}.choose:Chooser.__init__", _any_tolerance)),
+    CampaignFault(
+        "tolerance ignored", "choice by runs", attribute_patch(f"{RUN_MODULES}.choose:Chooser.__init__", _any_tolerance)
+    ),
     CampaignFault(
         "the least change of all quantities taken for each",
         "screen by runs",
-        attribute(
-            f"{RUNS}.screen:Screen.shares",
+        attribute_patch(
+            f"{RUN_MODULES}.screen:Screen.relative_changes",
             lambda real: lambda own, change: np.full(len(own.quantities), real(own, change).min()),
         ),
     ),

@@ -16,31 +16,31 @@ from models.contact.material import STEEL, Material, MaterialPair
 from models.contact.normal_problem import NormalSolution, centres
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 
 PAIR = MaterialPair()
-LOAD, RADIUS, MU = 1e4, 0.3, 0.3
+LOAD, RADIUS, FRICTION = 1e4, 0.3, 0.3
 A, B = 6e-3, 4e-3
-CELLS, DX, DY = (21, 31), 3.0e-4, 4.2e-4
+CELLS, CELL_LENGTH, CELL_WIDTH = (21, 31), 3.0e-4, 4.2e-4
 """Rows and columns, sizes (m) of cells that are not square: what is exchanged then shows."""
-PUBLISHED = (4.12, 3.67, 1.47)
+PUBLISHED_COEFFICIENTS = (4.12, 3.67, 1.47)
 """C11, C22, C23 of Kalker's table for a = b, nu = 0.25."""
 
 
-def _ball() -> tuple[float, float, float]:
+def _ball_contact() -> tuple[float, float, float]:
     """Radius (m) of the contact, approach (m) and peak pressure (Pa) of a ball on a plane, in closed form."""
     stiff = STEEL.E / (2.0 * (1.0 - STEEL.nu**2))
     a = (0.75 * LOAD * RADIUS / stiff) ** (1.0 / 3.0)
     return a, a * a / RADIUS, 1.5 * LOAD / (np.pi * a * a)
 
 
-def _hertz() -> float:
+def _hertz_errors() -> float:
     """Errors of Hertz's theory for a ball on a plane: radius, approach, peak pressure."""
     answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
-    return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
+    return largest_relative_difference(np.array([answer.a, answer.approach, answer.p0]) / _ball_contact(), np.ones(3))
 
 
-def _ellipse() -> float:
+def _ellipse_errors() -> float:
     """Errors for an ellipse: its load against the integral of its pressure, 2/3 pi a b p0, and which axis is longer."""
     answer = hertz.by_load(2.0, 1.0, LOAD, PAIR)
     balanced = abs(float(2.0 / 3.0 * np.pi * answer.a * answer.b * answer.p0) / LOAD - 1.0)
@@ -48,24 +48,26 @@ def _ellipse() -> float:
 
 
 def _normal_solution() -> NormalSolution:
-    y, x = centres(CELLS[0], DY), centres(CELLS[1], DX)
+    y, x = centres(CELLS[0], CELL_WIDTH), centres(CELLS[1], CELL_LENGTH)
     away = (x**2 + y[:, None] ** 2) / (2.0 * RADIUS)
-    return normal_problem.solve_normal(away, DX, DY, PAIR, load=LOAD)
+    return normal_problem.solve_normal(away, CELL_LENGTH, CELL_WIDTH, PAIR, load=LOAD)
 
 
-def _normal() -> float:
+def _normal_solution_errors() -> float:
     """Errors of the numerical normal solution for a ball: approach and peak pressure against the closed form."""
     answer = _normal_solution()
-    return largest_relative_difference(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
+    return largest_relative_difference(
+        np.array([answer.approach, answer.pressure.max()]) / _ball_contact()[1:], np.ones(2)
+    )
 
 
-def _published() -> float:
+def _kalker_errors() -> float:
     """Errors of forces at small creepages and spin, against Kalker's published coefficients."""
     soft = MaterialPair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
     a, shear = 5e-3, 1e11
     motion = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
-    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, motion[0], motion[1], motion[2]), soft)
-    c11, c22, c23 = PUBLISHED
+    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, FRICTION, motion[0], motion[1], motion[2]), soft)
+    c11, c22, c23 = PUBLISHED_COEFFICIENTS
     wanted = -shear * a * a * np.array([c11 * 1e-7, c22 * 1e-7, c23 * a * 1e-4])
     return largest_relative_difference(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
 
@@ -73,50 +75,50 @@ def _published() -> float:
 def _against_linear_theory() -> float:
     """Errors of forces on an ellipse with 41 cells at small creepages, against the linear theory."""
     motion = (1e-7, 0.7e-7, 2e-5)
-    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=41)
+    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, *motion), PAIR, cells=41)
     return largest_relative_difference(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
 
 
-def _sliding() -> float:
+def _sliding_errors() -> float:
     """Errors in gross sliding: force against mu N, and its direction."""
-    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, MU, 0.03, 0.04, 0.0), PAIR)
-    return largest_relative_difference(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
+    answer = creep.fastsim(creep.RollingEllipse(A, B, LOAD, FRICTION, 0.03, 0.04, 0.0), PAIR)
+    return largest_relative_difference(np.array([answer.fx, answer.fy]), -FRICTION * LOAD * np.array([0.6, 0.8]))
 
 
-def _theories() -> float:
+def _theory_difference() -> float:
     """Difference between exact theory and FASTSIM for contacts that slip in part, divided by mu N."""
-    pressed, a = _normal_solution(), _ball()[0]
+    pressed, a = _normal_solution(), _ball_contact()[0]
     motion = (1.2e-3, -0.8e-3, 0.2)
-    exact = rolling_problem.solve_rolling(pressed, MU, *motion, PAIR)
-    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, MU, *motion), PAIR)
-    return float(np.hypot(exact.fx - answer.fx, exact.fy - answer.fy) / (MU * LOAD))
+    exact = rolling_problem.solve_rolling(pressed, FRICTION, *motion, PAIR)
+    answer = creep.fastsim(creep.RollingEllipse(a, a, LOAD, FRICTION, *motion), PAIR)
+    return float(np.hypot(exact.fx - answer.fx, exact.fy - answer.fy) / (FRICTION * LOAD))
 
 
 @cache
-def _stuck() -> Array:
-    a = _ball()[0]
+def _forces_at_small_creepage() -> Array:
+    a = _ball_contact()[0]
     return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
 
 
 def _exact_against_linear() -> float:
     """Difference between the exact theory at small creepages and the linear theory."""
-    exact = rolling_problem.solve_rolling(_normal_solution(), MU, 2e-5, 1e-5, 0.0, PAIR)
-    return largest_relative_difference(np.array([exact.fx, exact.fy]), _stuck())
+    exact = rolling_problem.solve_rolling(_normal_solution(), FRICTION, 2e-5, 1e-5, 0.0, PAIR)
+    return largest_relative_difference(np.array([exact.fx, exact.fy]), _forces_at_small_creepage())
 
 
 CHECKS = {
-    "ball": Check("Hertz's ball in closed form", "relative", 1e-9, _hertz),
-    "ellipse": Check("load of an ellipse by its pressure", "relative", 1e-9, _ellipse),
-    "cells": Check("pressure of a ball on cells in closed form", "relative", 2e-3, _normal),
-    "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _published),
+    "ball": Check("Hertz's ball in closed form", "relative", 1e-9, _hertz_errors),
+    "ellipse": Check("load of an ellipse by its pressure", "relative", 1e-9, _ellipse_errors),
+    "cells": Check("pressure of a ball on cells in closed form", "relative", 2e-3, _normal_solution_errors),
+    "Kalker's table": Check("creep forces by published coefficients", "relative", 0.015, _kalker_errors),
     "linear": Check("creep forces of small creepages by linear theory", "of the largest", 5e-3, _against_linear_theory),
-    "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding),
+    "sliding": Check("sliding by mu N", "relative", 1e-6, _sliding_errors),
     "exact small": Check("exact theory by linear theory", "of the largest", 0.08, _exact_against_linear),
-    "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theories),
+    "theories": Check("exact theory beside FASTSIM", "mu N", 0.04, _theory_difference),
 }
 
 
-def _contacts(change: Callable[[Array], None]) -> Patch:
+def _contacts_patch(change: Callable[[Array], None]) -> Patch:
     """Patch that changes FASTSIM's input CONTACT (n,) in place."""
 
     def contacts(original: Any) -> Any:
@@ -127,43 +129,47 @@ def _contacts(change: Callable[[Array], None]) -> Patch:
 
         return made
 
-    return attribute("models.contact.fastsim:contacts_of", contacts)
+    return attribute_patch("models.contact.fastsim:contacts_of", contacts)
 
 
-def _times(name: str, factor: float) -> Patch:
+def _multiplication_patch(name: str, factor: float) -> Patch:
     def change(contacts: Array) -> None:
         contacts[name] *= factor
 
-    return _contacts(change)
+    return _contacts_patch(change)
 
 
-def _exchanged(first: str, second: str) -> Patch:
+def _exchange_patch(first: str, second: str) -> Patch:
     def change(contacts: Array) -> None:
         contacts[first], contacts[second] = contacts[second].copy(), contacts[first].copy()
 
-    return _contacts(change)
+    return _contacts_patch(change)
 
 
 FAULTS = (
     CampaignFault(
         "one body's modulus for the pair's",
         "Hertz",
-        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair)),
+        attribute_patch(
+            "models.contact.hertz:by_load", lambda real: lambda a, b, load, pair: real(a, b, load / 2, pair)
+        ),
     ),
     CampaignFault(
         "diameter for radius",
         "Hertz",
-        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(a / 2, b / 2, *arguments)),
+        attribute_patch(
+            "models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(a / 2, b / 2, *arguments)
+        ),
     ),
     CampaignFault(
         "curvatures exchanged",
         "Hertz",
-        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(b, a, *arguments)),
+        attribute_patch("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(b, a, *arguments)),
     ),
     CampaignFault(
         "axes not squared up: p0 of a cylinder",
         "Hertz",
-        attribute(
+        attribute_patch(
             "models.contact.hertz:by_load",
             lambda real: lambda *arguments: replace(real(*arguments), p0=2.0 / 3.0 * 4.0 / np.pi * real(*arguments).p0),
         ),
@@ -171,41 +177,45 @@ FAULTS = (
     CampaignFault(
         "sides of a cell exchanged",
         "normal problem",
-        attribute(
+        attribute_patch(
             "models.contact.normal_problem:influence", lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair)
         ),
     ),
     CampaignFault(
         "influence of one body alone",
         "normal problem",
-        attribute("models.contact.normal_problem:influence", lambda real: lambda *arguments: 0.5 * real(*arguments)),
+        attribute_patch(
+            "models.contact.normal_problem:influence", lambda real: lambda *arguments: 0.5 * real(*arguments)
+        ),
     ),
     CampaignFault(
         "whole first step at the leading edge",
         "FASTSIM",
-        attribute("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN}),
+        attribute_patch("models.contact.fastsim:MARCHES", lambda real: {**real, "second-order": PLAIN}),
     ),
-    CampaignFault("sign of the spin", "FASTSIM", _times("spin", -1.0)),
-    CampaignFault("creepages exchanged", "FASTSIM", _exchanged("xi_x", "xi_y")),
-    CampaignFault("semi-axes exchanged", "FASTSIM", _exchanged("a", "b")),
-    CampaignFault("flexibilities along and across exchanged", "FASTSIM", _exchanged("l1", "l2")),
-    CampaignFault("flexibility of spin 10 % off", "FASTSIM", _times("l3", 1.1)),
-    CampaignFault("friction 1 % off", "FASTSIM", _times("mu", 1.01)),
-    CampaignFault("bound of the cylinder", "FASTSIM", _times("load", 0.9)),
+    CampaignFault("sign of the spin", "FASTSIM", _multiplication_patch("spin", -1.0)),
+    CampaignFault("creepages exchanged", "FASTSIM", _exchange_patch("xi_x", "xi_y")),
+    CampaignFault("semi-axes exchanged", "FASTSIM", _exchange_patch("a", "b")),
+    CampaignFault("flexibilities along and across exchanged", "FASTSIM", _exchange_patch("l1", "l2")),
+    CampaignFault("flexibility of spin 10 % off", "FASTSIM", _multiplication_patch("l3", 1.1)),
+    CampaignFault("friction 1 % off", "FASTSIM", _multiplication_patch("mu", 1.01)),
+    CampaignFault("bound of the cylinder", "FASTSIM", _multiplication_patch("load", 0.9)),
     CampaignFault(
         "gradient taken downstream",
         "exact theory",
-        attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *arguments: -real(*arguments)),
+        attribute_patch("models.contact.rolling_problem:rigid_slip", lambda real: lambda *arguments: -real(*arguments)),
     ),
     CampaignFault(
         "gradient of half the length",
         "exact theory",
-        attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * arguments for arguments in real)),
+        attribute_patch(
+            "models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * arguments for arguments in real)
+        ),
     ),
     CampaignFault(
         "sign of the spin",
         "exact theory",
-        attribute(
+        attribute_patch(
             "models.contact.rolling_problem:rigid_slip",
             lambda real: lambda x, y, xi_x, xi_y, spin: real(x, y, xi_x, xi_y, -spin),
         ),

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from models.drawing.figures import COLUMN_WIDTH, SMALL_TEXT, heading, subplots
+from models.drawing.figures import COLUMN_WIDTH, SMALL_TEXT, add_heading, subplots
 
-DECADES = 12
+SCALE_DECADES = 12
 """End of the colour scale; a refused run counts as this."""
-BLUES = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6", "#08488e"))
+BLUE_COLOUR_MAP = LinearSegmentedColormap.from_list("seen", ("#d6e6f4", "#6aaed6", "#08488e"))
 
 
 def fault_map(
@@ -27,9 +27,9 @@ def fault_map(
     ratios : by vehicle, rows of faults and columns of checks; hidden : faults that the second vehicle hides.
     """
     figure, axes = subplots(1, len(ratios), figsize=(COLUMN_WIDTH, 1.6 + 0.17 * len(faults)), sharey=True)
-    heading(figure, "Which check sees which fault: decades above its tolerance")
+    add_heading(figure, "Which check sees which fault: decades above its tolerance")
     for axis, (vehicle, values) in zip(np.atleast_1d(axes), ratios.items(), strict=True):
-        image = _cells(axis, np.array(values), checks)
+        image = _draw_cells(axis, np.array(values), checks)
         axis.set_title(titles[vehicle])
     first, last = np.atleast_1d(axes)[[0, -1]]
     first.set_yticks(range(len(faults)), faults, fontsize=SMALL_TEXT)
@@ -40,9 +40,11 @@ def fault_map(
     return figure
 
 
-def _cells(axis: Any, ratios: np.ndarray, checks: Sequence[str]) -> Any:
-    decades = np.log10(np.clip(ratios, 1e-3, 10.0**DECADES))
-    image = axis.imshow(np.where(ratios > 1, decades, np.nan), cmap=BLUES, vmin=0, vmax=DECADES, aspect="auto")
+def _draw_cells(axis: Any, ratios: np.ndarray, checks: Sequence[str]) -> Any:
+    decades = np.log10(np.clip(ratios, 1e-3, 10.0**SCALE_DECADES))
+    image = axis.imshow(
+        np.where(ratios > 1, decades, np.nan), cmap=BLUE_COLOUR_MAP, vmin=0, vmax=SCALE_DECADES, aspect="auto"
+    )
     axis.set_xticks(range(len(checks)), checks, rotation=45, ha="right", rotation_mode="anchor", fontsize=SMALL_TEXT)
     axis.set_xticks(np.arange(0.5, len(checks) - 1), minor=True)
     axis.set_yticks(np.arange(0.5, len(ratios) - 1), minor=True)

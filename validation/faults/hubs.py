@@ -12,22 +12,22 @@ from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import CutVehicle
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
-from validation.spatial.cars import by_jacobians, r19, static
+from validation.faults.patches import Patch, attribute_patch
+from validation.spatial.cars import by_jacobians, r19, static_forces
 
 
-def _driven(hubs: np.ndarray) -> HubModel:
+def _driven_model(hubs: np.ndarray) -> HubModel:
     """R19-free in MuJoCo, driven by these wrenches (3, 6 h) on its hubs."""
     return build("mujoco", r19(), HubInputs(hubs), 1e-3, 1e-3)
 
 
-def _jacobians() -> float:
+def _jacobian_difference() -> float:
     """Relative difference of the generalised forces of hub wrenches from those by MuJoCo's Jacobians, far from rest."""
-    vehicle, rows = r19(), static(r19(), 3).hubs
+    vehicle, rows = r19(), static_forces(r19(), 3).hubs
     rows += np.random.default_rng(4).normal(0.0, 500.0, rows.shape[1])
     q = np.random.default_rng(5).uniform(-0.03, 0.03, vehicle.size)
     q[3:6] = 1.0, 0.1, -0.2
-    built, bare = _driven(rows), _driven(0.0 * rows)
+    built, bare = _driven_model(rows), _driven_model(0.0 * rows)
     return largest_relative_difference(
         built.forces_at_rest(q) - bare.forces_at_rest(q), by_jacobians(built, q, rows[0])
     )
@@ -36,11 +36,11 @@ def _jacobians() -> float:
 def _accelerations_at_rest() -> float:
     """Largest acceleration at rest under the static loads (m/s^2, rad/s^2), which should be 0."""
     rest = np.zeros(r19().size)
-    return float(np.abs(_driven(static(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
+    return float(np.abs(_driven_model(static_forces(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
 
 
 CHECKS = {
-    "Jacobians": Check("joint forces by MuJoCo's own Jacobians", "of the largest", 1e-12, _jacobians),
+    "Jacobians": Check("joint forces by MuJoCo's own Jacobians", "of the largest", 1e-12, _jacobian_difference),
     "still": Check("no acceleration on the static loads", "m/s^2, rad/s^2", 1e-9, _accelerations_at_rest),
 }
 
@@ -56,7 +56,7 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
 
         return made
 
-    return attribute("models.engines.cut_vehicle:table", table)
+    return attribute_patch("models.engines.cut_vehicle:table", table)
 
 
 FAULTS = (

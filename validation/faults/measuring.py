@@ -13,18 +13,18 @@ from models.fatigue import counting, damage
 from models.measured import resampling, units
 from models.road import iso8608
 from models.sensors import rigid_body_motion as body
-from models.sensors.rotations import from_cardan, matrix
+from models.sensors.rotations import from_cardan, rotation_matrix
 from models.sensors.sensor_array import SensorArray, in_space, sensor_array
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 
-LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+STANDARD_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 """Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
-PRINTED = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+PRINTED_CYCLES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 SENSOR_PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
-PERIOD, COUNT = 5e-3, 400
-UNITS = {
+PERIOD, SAMPLE_COUNT = 5e-3, 400
+UNIT_FACTORS = {
     ("kN", "force"): 1e3,
     ("deg/s", "angular rate"): np.pi / 180,
     ("g", "acceleration"): 9.80665,
@@ -33,58 +33,63 @@ UNITS = {
 }
 
 
-def _streams() -> float:
+def _stream_correlation() -> float:
     """Largest correlation between the noise streams of two paths and two sources, in standard errors."""
     streams = [
-        noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
+        noise.normal_samples(3, path, noise.SAMPLES_PER_BLOCK, 1, source=source)[:, 0]
         for path in (0, 1)
         for source in (noise.FORCES, noise.GYRO)
     ]
-    return max(abs(float(first @ two)) / noise.BLOCK**0.5 for first, two in combinations(streams, 2))
+    return max(abs(float(first @ two)) / noise.SAMPLES_PER_BLOCK**0.5 for first, two in combinations(streams, 2))
 
 
 def _variance() -> float:
     """Difference of a noise stream's variance from 1, in standard errors."""
-    stream = noise.normal(3, 0, noise.BLOCK, 1)
-    return abs(float(np.mean(stream**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
+    stream = noise.normal_samples(3, 0, noise.SAMPLES_PER_BLOCK, 1)
+    return abs(float(np.mean(stream**2)) - 1.0) * (noise.SAMPLES_PER_BLOCK / 2.0) ** 0.5
 
 
 def _stream_difference() -> float:
     """Difference between a noise stream read in pieces and as a whole."""
-    parts = [noise.normal(3, 0, 50, 1, first=first) for first in (0, 50)]
-    return float(np.abs(np.concatenate(parts) - noise.normal(3, 0, 100, 1)).max())
+    parts = [noise.normal_samples(3, 0, 50, 1, first=first) for first in (0, 50)]
+    return float(np.abs(np.concatenate(parts) - noise.normal_samples(3, 0, 100, 1)).max())
 
 
-def _damage() -> float:
+def _damage_error() -> float:
     """Error of the damage of the standard's load at slopes 1 and 5, against that of its printed cycles."""
     return max(
-        abs(damage.pseudo_damage(LOAD, slope) / sum(n * size**slope for size, n in PRINTED.items()) - 1.0)
+        abs(
+            damage.pseudo_damage(STANDARD_LOAD, slope) / sum(n * size**slope for size, n in PRINTED_CYCLES.items())
+            - 1.0
+        )
         for slope in (1.0, 5.0)
     )
 
 
-def _pairs() -> float:
+def _range_pair_error() -> float:
     """Error of the range pairs of the standard's load, against its printed cycles."""
-    counts = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
+    counts = counting.range_pairs(
+        np.array(list(PRINTED_CYCLES)), np.array(list(PRINTED_CYCLES.values())), np.array([3.5, 4.0, 8.5])
+    )
     return largest_relative_difference(counts, np.array([3.5, 3.5, 0.5]))
 
 
-def _crossings() -> float:
+def _crossing_error() -> float:
     """Error of the level crossings of the standard's load at 0, 2 and 4.5, against counts by hand."""
     return largest_relative_difference(
-        counting.level_crossings(LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
+        counting.level_crossings(STANDARD_LOAD, np.array([0.0, 2.0, 4.5])), np.array([4.0, 3.0, 1.0])
     )
 
 
-def _units() -> float:
+def _unit_errors() -> float:
     """Errors of unit conversion factors."""
     return max(
-        abs(units.conversion(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
-        for (unit, quantity), wanted in UNITS.items()
+        abs(units.factor_to_si(unit, quantity, "", "") / wanted - 1.0)  # type: ignore[arg-type]
+        for (unit, quantity), wanted in UNIT_FACTORS.items()
     )
 
 
-def _clock() -> float:
+def _resampling_error() -> float:
     """Error, relative to the amplitude, of a 2 Hz sine resampled from 200 Hz and from 4 kHz to 1 kHz."""
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
@@ -94,50 +99,50 @@ def _clock() -> float:
     return worst
 
 
-def _gap() -> float:
+def _points_in_gap() -> float:
     """Number of resampled points inside a gap of nine missing samples that are finite; it should be 0."""
     times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
     values = resampling.resample_to(times, times, 0.01, np.arange(41, 48) / 100.0)
     return float(np.isfinite(values).sum())
 
 
-def _sections() -> float:
+def _section_force_error() -> float:
     """Error of the section forces in the body's axes for an upward force, with the body standing on its tail and with
     its nose 30 degrees up."""
     forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
-    have = np.concatenate([forces[name] for name in score.CHANNELS])
+    have = np.concatenate([forces[name] for name in score.SECTION_FORCE_CHANNELS])
     return largest_relative_difference(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
 
 @cache
-def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
+def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     """Sensors on a body that pitches and heaves: their array, readings (n, 4, 3), pitch (n,) and vertical
     acceleration."""
-    t = PERIOD * np.arange(COUNT)
+    t = PERIOD * np.arange(SAMPLE_COUNT)
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
-    none = np.zeros(COUNT)
-    S = matrix(from_cardan(none, pitch, none))
+    none = np.zeros(SAMPLE_COUNT)
+    S = rotation_matrix(from_cardan(none, pitch, none))
     felt = np.einsum("nji,nj->ni", S, np.column_stack([none, none, heave - 9.81]))
     w, alpha = (np.column_stack([none, component, none]) for component in (rate, turn))
     return sensor_array(SENSOR_PLACES), in_space(np.array(list(SENSOR_PLACES.values())), felt, w, alpha), pitch, heave
 
 
-def _motion() -> float:
+def _motion_errors() -> float:
     """Errors of the rates and the vertical acceleration of this body that are computed from the readings."""
-    array, read, _, heave = _turning()
-    moved_body = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
-    rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
+    array, read, _, heave = _turning_body()
+    moved_body = body.recovered_motion(array, read, PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
+    rate = 0.6 * np.cos(2 * PERIOD * np.arange(SAMPLE_COUNT))
     return max(
         largest_relative_difference(moved_body.rates[:, 1], rate),
         largest_relative_difference(moved_body.acceleration[:, 2], heave),
     )
 
 
-def _rigid() -> float:
+def _unexplained_share() -> float:
     """Share of the readings that no rigid motion explains."""
-    array, read, *_ = _turning()
-    return body.quality(array, read).share
+    array, read, *_ = _turning_body()
+    return body.fit_quality(array, read).share
 
 
 def _road() -> float:
@@ -147,32 +152,32 @@ def _road() -> float:
     return abs(0.5 * float(np.sum(road.amplitude**2)) / wanted - 1.0)
 
 
-def _levels() -> float:
+def _road_level_error() -> float:
     """Error of the two-sided level of class C over rad/m, which is pi n0^2 Gd."""
     return abs(iso8608.level_of_class("C") / (np.pi * 0.01 * 256e-6) - 1.0)
 
 
 CHECKS = {
-    "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _streams),
+    "streams": Check("streams of two paths and sources are uncorrelated", "standard errors", 4.5, _stream_correlation),
     "variance": Check("variance of a stream is 1", "standard errors", 4.5, _variance),
     "pieces": Check("a stream in pieces is the whole", "", 1e-15, _stream_difference),
-    "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage),
-    "pairs": Check("range pairs by the same", "of the largest", 1e-12, _pairs),
-    "crossings": Check("crossings counted by hand", "of the largest", 1e-12, _crossings),
-    "units": Check("factors of units", "relative", 1e-12, _units),
-    "clock": Check("sines of two rates onto one clock", "of the amplitude", 1e-3, _clock),
-    "gap": Check("numbers within a gap", "samples", 0.5, _gap),
-    "sections": Check("forces along a turned body", "of the largest", 1e-12, _sections),
-    "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _motion),
-    "rigid": Check("a rigid body is found rigid", "share", 1e-9, _rigid),
+    "damage": Check("damage by the cycles that the standard prints", "relative", 1e-12, _damage_error),
+    "pairs": Check("range pairs by the same", "of the largest", 1e-12, _range_pair_error),
+    "crossings": Check("crossings counted by hand", "of the largest", 1e-12, _crossing_error),
+    "units": Check("factors of units", "relative", 1e-12, _unit_errors),
+    "clock": Check("sines of two rates onto one clock", "of the amplitude", 1e-3, _resampling_error),
+    "gap": Check("numbers within a gap", "samples", 0.5, _points_in_gap),
+    "sections": Check("forces along a turned body", "of the largest", 1e-12, _section_force_error),
+    "motion": Check("rate and acceleration from accelerometers", "of the largest", 1e-4, _motion_errors),
+    "rigid": Check("a rigid body is found rigid", "share", 1e-9, _unexplained_share),
     "road": Check("variance of a road of class C", "relative", 1e-9, _road),
-    "levels": Check("two-sided level of class C", "relative", 1e-9, _levels),
+    "levels": Check("two-sided level of class C", "relative", 1e-9, _road_level_error),
 }
 
 
-def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
+def _noise_block_patch(change: Callable[..., tuple[int, ...]]) -> Patch:
     """Fault: noise blocks are drawn for changed values of (seed, path, block, channels, source)."""
-    return attribute(
+    return attribute_patch(
         "models.core.noise:normal_block",
         lambda real: (
             lambda seed, path, block, channels, source=0, **rows: real(
@@ -183,28 +188,30 @@ def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
 
 
 def _change_resampling(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Patch:
-    return attribute(
+    return attribute_patch(
         "models.measured.resampling:resample_to",
         lambda real: lambda times, values, period, grid: change(real(times + late * period, values, period, grid)),
     )
 
 
-def _factor(name: str, factor: float) -> Patch:
-    return attribute(
-        "models.measured.units:conversion",
+def _factor_patch(name: str, factor: float) -> Patch:
+    return attribute_patch(
+        "models.measured.units:factor_to_si",
         lambda real: lambda unit, *arguments: real(unit, *arguments) * (factor if unit == name else 1.0),
     )
 
 
 def _change_rainflow(change: Callable[[Any], Any]) -> Patch:
     """Fault: spans, means and counts of the cycles are changed."""
-    return attribute("models.fatigue.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
+    return attribute_patch(
+        "models.fatigue.rainflow_cycles:rainflow_cycles", lambda real: lambda turns: change(real(turns))
+    )
 
 
-def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _readings_patch(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Fault: the sensors' readings (n, 4, 3) are changed before motion is computed from them."""
-    return attribute(
-        "models.sensors.rigid_body_motion:spin",
+    return attribute_patch(
+        "models.sensors.rigid_body_motion:spin_from_readings",
         lambda real: (
             lambda array, readings: real(
                 array, change(readings) if readings.shape[1] == len(SENSOR_PLACES) else readings
@@ -222,18 +229,22 @@ def _every_way(original: Any) -> Any:
 
 
 FAULTS = (
-    CampaignFault("paths share one stream", "noise", _normal(lambda s, p, b, c, o: (s, 0, b, c, o))),
-    CampaignFault("gyro and forces share one stream", "noise", _normal(lambda s, p, b, c, o: (s, p, b, c, 0))),
+    CampaignFault("paths share one stream", "noise", _noise_block_patch(lambda s, p, b, c, o: (s, 0, b, c, o))),
+    CampaignFault(
+        "gyro and forces share one stream", "noise", _noise_block_patch(lambda s, p, b, c, o: (s, p, b, c, 0))
+    ),
     CampaignFault(
         "deviation for variance",
         "noise",
-        attribute("models.core.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5),
+        attribute_patch(
+            "models.core.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5
+        ),
     ),
     CampaignFault(
         "stream begins anew at every call",
         "noise",
-        attribute(
-            "models.core.noise:normal",
+        attribute_patch(
+            "models.core.noise:normal_samples",
             lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
         ),
     ),
@@ -245,52 +256,56 @@ FAULTS = (
     CampaignFault(
         "pairs beyond a range, not from it on",
         "counting",
-        attribute(
+        attribute_patch(
             "models.fatigue.counting:range_pairs",
             lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)),
         ),
     ),
     CampaignFault(
-        "levels crossed either way", "counting", attribute("models.fatigue.counting:level_crossings", _every_way)
+        "levels crossed either way", "counting", attribute_patch("models.fatigue.counting:level_crossings", _every_way)
     ),
-    CampaignFault("kN taken for N", "units", _factor("kN", 1e-3)),
-    CampaignFault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
-    CampaignFault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
-    CampaignFault("sign of one channel", "units", _factor("mm", -1.0)),
+    CampaignFault("kN taken for N", "units", _factor_patch("kN", 1e-3)),
+    CampaignFault("degrees taken for rad", "units", _factor_patch("deg/s", 180.0 / np.pi)),
+    CampaignFault("g of 9.81 m/s^2", "units", _factor_patch("g", 9.81 / 9.80665)),
+    CampaignFault("sign of one channel", "units", _factor_patch("mm", -1.0)),
     CampaignFault("a sample late", "clock", _change_resampling(1.0)),
     CampaignFault("half a sample late", "clock", _change_resampling(0.5)),
     CampaignFault(
         "gaps bridged",
         "clock",
-        attribute(
-            "models.measured.resampling:_unknown",
+        attribute_patch(
+            "models.measured.resampling:_unknown_points",
             lambda real: lambda times, *own: np.zeros(7, dtype=bool) if len(times) < 100 else real(times, *own),
         ),
     ),
     CampaignFault(
         "section forces in the inertial frame",
         "sections",
-        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)),
+        attribute_patch(
+            "models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)
+        ),
     ),
     CampaignFault(
         "body turned the other way",
         "sections",
-        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
+        attribute_patch("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
     ),
     CampaignFault(
         "front and rear sections exchanged",
         "sections",
-        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
+        attribute_patch("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
     ),
     CampaignFault(
-        "gravity turned round", "motion", attribute("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real)
+        "gravity turned round",
+        "motion",
+        attribute_patch("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real),
     ),
-    CampaignFault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
-    CampaignFault("one sensor 1 % off", "motion", _read(_second_scaled)),
+    CampaignFault("readings of two sensors exchanged", "motion", _readings_patch(lambda read: read[:, [1, 0, 2, 3]])),
+    CampaignFault("one sensor 1 % off", "motion", _readings_patch(_second_scaled)),
     CampaignFault(
         "lever of the sensors left out",
         "motion",
-        attribute(
+        attribute_patch(
             "models.sensors.rigid_body_motion:reference_acceleration",
             lambda real: lambda a, r, o, alpha, w, down: real(a, r, o, 0.0 * alpha, 0.0 * w, down),
         ),
@@ -298,12 +313,14 @@ FAULTS = (
     CampaignFault(
         "two-sided density for one-sided",
         "road",
-        attribute("models.road.iso8608:SIDES", lambda real: {**real, "one-sided": 2.0}),
+        attribute_patch("models.road.iso8608:FACTOR_TO_ONE_SIDED", lambda real: {**real, "one-sided": 2.0}),
     ),
     CampaignFault(
-        "class D for C", "road", attribute("models.road.iso8608:CLASSES", lambda real: {**real, "C": real["D"]})
+        "class D for C",
+        "road",
+        attribute_patch("models.road.iso8608:DENSITY_OF_CLASS", lambda real: {**real, "C": real["D"]}),
     ),
 )
 
-WHAT = "noise, sensors, units, clocks, counting and roads"
-CAMPAIGN = Campaign("planted.measuring", WHAT, "measured", CHECKS, FAULTS)
+CAMPAIGN_SUBJECT = "noise, sensors, units, clocks, counting and roads"
+CAMPAIGN = Campaign("planted.measuring", CAMPAIGN_SUBJECT, "measured", CHECKS, FAULTS)

@@ -11,22 +11,22 @@ import mujoco
 import numpy as np
 
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 from validation.spatial.cars import rough_car
 from validation.spatial.native_builds import acceleration_error, random_states
 
-STATES = 3
-EXUDYN = "models.engines.native_exudyn"
+STATE_COUNT = 3
+EXUDYN_MODULE = "models.engines.native_exudyn"
 
 
 def _beside_compiled(engine: str) -> Callable[[], float]:
     """Largest difference of an engine's accelerations from those by compiled forces."""
-    return lambda: acceleration_error(engine, rough_car(), random_states(rough_car(), STATES))
+    return lambda: acceleration_error(engine, rough_car(), random_states(rough_car(), STATE_COUNT))
 
 
-TITLE = "accelerations of {} beside compiled forces"
+CHECK_TITLE = "accelerations of {} beside compiled forces"
 CHECKS = {
-    engine: Check(TITLE.format(engine), "of the largest", 1e-12, _beside_compiled(engine))
+    engine: Check(CHECK_TITLE.format(engine), "of the largest", 1e-12, _beside_compiled(engine))
     for engine in ("exudyn", "mujoco")
 }
 
@@ -42,10 +42,10 @@ def _in_model(change: Callable[[Any], None]) -> Patch:
 
         return written
 
-    return attribute("models.engines.free_vehicle_mujoco:set_laws", set_laws)
+    return attribute_patch("models.engines.free_vehicle_mujoco:set_laws", set_laws)
 
 
-def _scale(array: str) -> Patch:
+def _scale_patch(array: str) -> Patch:
     """Fault: the first row of an array of the model is 1 % larger."""
 
     def change(model: Any) -> None:
@@ -77,12 +77,12 @@ def _mount_preload(model: Any) -> None:
     model.actuator_biasprm[actuator, 0] *= 1.01
 
 
-def _corner(model: Any) -> None:
+def _shift_corner(model: Any) -> None:
     """Fault: the force limit of an actuator, which represents a corner of a curve, is switched off."""
     model.actuator_forcelimited[int(np.argmax(model.actuator_forcelimited))] = 0
 
 
-def _law(**factors: float) -> Patch:
+def _element_law_patch(**factors: float) -> Patch:
     """Fault: stiffness, damping or preload of Exudyn's first element is multiplied by a factor."""
 
     def add_parts(original: Any) -> Any:
@@ -93,7 +93,7 @@ def _law(**factors: float) -> Patch:
 
         return added
 
-    return attribute("models.engines.free_vehicle_exudyn:add_parts", add_parts)
+    return attribute_patch("models.engines.free_vehicle_exudyn:add_parts", add_parts)
 
 
 def _bar_factor(original: Any) -> Any:
@@ -117,18 +117,20 @@ def _in_space(original: Any) -> Any:
 
 
 FAULTS = (
-    CampaignFault("a stiffness 1 % off", "MuJoCo", _scale("tendon_stiffness")),
-    CampaignFault("a damping 1 % off", "MuJoCo", _scale("tendon_damping")),
-    CampaignFault("a preload 1 % off", "MuJoCo", _scale("tendon_lengthspring")),
+    CampaignFault("a stiffness 1 % off", "MuJoCo", _scale_patch("tendon_stiffness")),
+    CampaignFault("a damping 1 % off", "MuJoCo", _scale_patch("tendon_damping")),
+    CampaignFault("a preload 1 % off", "MuJoCo", _scale_patch("tendon_lengthspring")),
     CampaignFault("a bar's factor 1 % off", "MuJoCo", _in_model(_bar_tendon)),
     CampaignFault("a mount's axis fixed in the engine", "MuJoCo", _in_model(_swap_sites)),
     CampaignFault("a mount's preload 1 % off", "MuJoCo", _in_model(_mount_preload)),
-    CampaignFault("a curve without its corner", "MuJoCo", _in_model(_corner)),
-    CampaignFault("a stiffness 1 % off", "Exudyn", _law(stiffness=1.01)),
-    CampaignFault("a damping 1 % off", "Exudyn", _law(damping=1.01)),
-    CampaignFault("a preload 1 % off", "Exudyn", _law(held=1.01)),
-    CampaignFault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:Coordinates.add", _bar_factor)),
-    CampaignFault("mounts' axes fixed in the space", "Exudyn", attribute(f"{EXUDYN}:_Trees._tree", _in_space)),
+    CampaignFault("a curve without its corner", "MuJoCo", _in_model(_shift_corner)),
+    CampaignFault("a stiffness 1 % off", "Exudyn", _element_law_patch(stiffness=1.01)),
+    CampaignFault("a damping 1 % off", "Exudyn", _element_law_patch(damping=1.01)),
+    CampaignFault("a preload 1 % off", "Exudyn", _element_law_patch(held=1.01)),
+    CampaignFault("a bar's factor 1 % off", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:Coordinates.add", _bar_factor)),
+    CampaignFault(
+        "mounts' axes fixed in the space", "Exudyn", attribute_patch(f"{EXUDYN_MODULE}:_Trees._tree", _in_space)
+    ),
 )
 
 CAMPAIGN = Campaign("planted.native", "springs of the engines' own", "drift", CHECKS, FAULTS)

@@ -25,17 +25,17 @@ def no_fault() -> Context:
     return nullcontext
 
 
-def attribute(path: str, change: Callable[[Any], Any]) -> Patch:
+def attribute_patch(path: str, change: Callable[[Any], Any]) -> Patch:
     """Patch that replaces ``module:object.name`` by change(original)."""
 
     def prepare() -> Context:
-        owner, name = _owner(path)
+        owner, name = _owner_and_name(path)
         return lambda: patch.object(owner, name, change(getattr(owner, name)))
 
     return prepare
 
 
-def _owner(path: str) -> tuple[Any, str]:
+def _owner_and_name(path: str) -> tuple[Any, str]:
     from importlib import import_module
 
     module, _, rest = path.partition(":")
@@ -128,7 +128,7 @@ def not_installed(original: Any) -> Any:
     return lambda law: nullcontext()
 
 
-def negative(original: Any) -> Any:
+def negated_result(original: Any) -> Any:
     """Fault: a method's result has the opposite sign."""
 
     def method(*arguments: Any) -> Any:
@@ -141,7 +141,7 @@ def negative(original: Any) -> Any:
 # the equations
 
 
-def rewritten(**functions: Callable[[], Any]) -> Patch:
+def rewritten_reference(**functions: Callable[[], Any]) -> Patch:
     """Patch that runs the reference without compilation, with some functions of its equations replaced."""
 
     def prepare() -> Context:
@@ -151,13 +151,13 @@ def rewritten(**functions: Callable[[], Any]) -> Patch:
             reference: {"_FIXED": {}, "_SINGLE": {}, "njit": lambda **options: lambda function: function},
             equations: {name: function() for name, function in functions.items()},
         }
-        return lambda: _patched(changes)
+        return lambda: _patched_functions(changes)
 
     return prepare
 
 
 @contextmanager
-def _patched(changes: dict[Any, dict[str, Any]]) -> Iterator[None]:
+def _patched_functions(changes: dict[Any, dict[str, Any]]) -> Iterator[None]:
     with ExitStack() as stack:
         for module, replaced in changes.items():
             for name, value in replaced.items():

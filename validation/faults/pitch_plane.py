@@ -4,23 +4,23 @@ import math
 from collections.abc import Sequence
 
 from validation.common.rows import Drawn, Observed, Row, Saved, Table
-from validation.faults.bench import CHECKS, Bench, size
-from validation.faults.campaign import SYSTEM
+from validation.faults.bench import CHECKS, Bench, size_of_error
+from validation.faults.campaign import FAULT_SYSTEM
 from validation.faults.planting import (
     ADAPTER_FAULTS,
-    CLEAN,
+    CONTROLS_WITHOUT_FAULT,
     DESCRIPTION_FAULTS,
     EQUATIONS_FAULTS,
     FAULTS,
     INPUT_FAULTS,
     EngineFault,
-    planted,
+    planted_builder,
 )
 
-TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
-DURATION = 0.1
+ASYMMETRIC_SET, SYMMETRIC_SET = "asymmetric_twin", "itwm_drift"
+RUN_DURATION = 0.1
 """s of every run: what is planted shows at once."""
-HIDDEN = (
+HIDDEN_BY_SYMMETRY = (
     "a and b swapped",
     "front and rear suspension swapped",
     "front and rear tyre swapped",
@@ -32,36 +32,36 @@ HIDDEN = (
 
 def measure(
     faults: Sequence[EngineFault] = FAULTS,
-    clean: Sequence[EngineFault] = CLEAN,
-    vehicles: Sequence[str] = (TWIN, SYMMETRIC),
+    clean: Sequence[EngineFault] = CONTROLS_WITHOUT_FAULT,
+    vehicles: Sequence[str] = (ASYMMETRIC_SET, SYMMETRIC_SET),
 ) -> Saved:
     """Records of engines without faults and with each planted fault, for every check on every vehicle."""
-    benches = [Bench(name, DURATION) for name in vehicles]
+    benches = [Bench(name, RUN_DURATION) for name in vehicles]
     return {
-        name: [_record(fault, benches) for fault in planted_here]
+        name: [_error_ratios(fault, benches) for fault in planted_here]
         for name, planted_here in (("clean", clean), ("faults", faults))
     }
 
 
-def _record(fault: EngineFault, benches: list[Bench]) -> Saved:
+def _error_ratios(fault: EngineFault, benches: list[Bench]) -> Saved:
     """Ratio of error to tolerance for every check, by vehicle and engine; None for a refused or failed run."""
     ratios = {
         bench.parameters: {
-            engine: {name: _ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
+            engine: {name: _error_ratio(fault, engine, name, bench) for name in CHECKS} for engine in fault.engines
         }
         for bench in benches
     }
-    place = next((name for name, group in PLACES.items() if fault in group), "nowhere")
+    place = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
     return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
 
 
-def _ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
+def _error_ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
     check = CHECKS[name]
-    ratio = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
+    ratio = size_of_error(check, bench, engine, planted_builder(fault, engine)) / check.tolerance(engine)
     return ratio if math.isfinite(ratio) else None
 
 
-PLACES = {
+FAULTS_BY_PLACE = {
     "description": DESCRIPTION_FAULTS,
     "input": INPUT_FAULTS,
     "adapter": ADAPTER_FAULTS,
@@ -69,12 +69,12 @@ PLACES = {
 }
 
 
-def seen(record: Saved, check: str, vehicle: str = TWIN) -> bool:
+def is_seen(record: Saved, check: str, vehicle: str = ASYMMETRIC_SET) -> bool:
     """Whether a check sees the fault in every engine in which it is planted."""
     return all(ratio is None or ratio > 1 for ratio in _ratios_of_check(record, check, vehicle))
 
 
-def least(record: Saved, check: str, vehicle: str) -> float:
+def smallest_ratio(record: Saved, check: str, vehicle: str) -> float:
     """Smallest ratio of error to tolerance among the engines; infinite for refused runs."""
     return min(math.inf if ratio is None else ratio for ratio in _ratios_of_check(record, check, vehicle))
 
@@ -83,7 +83,7 @@ def _ratios_of_check(record: Saved, check: str, vehicle: str) -> list[float | No
     return [ratios[check] for ratios in record["ratios"][vehicle].values()]
 
 
-def caught(record: Saved, vehicle: str = TWIN) -> bool:
+def is_caught(record: Saved, vehicle: str = ASYMMETRIC_SET) -> bool:
     """Whether in every engine at least one check sees the fault."""
     engines = record["ratios"][vehicle].values()
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
@@ -100,43 +100,47 @@ def rows(data: Saved) -> list[Row]:
         for ratios in vehicle.values()
         for ratio in ratios.values()
     )
-    single = [record for record in faulty if sum(seen(record, name) for name in CHECKS) == 1]
-    told = [f"{record['fault']} ({next(name for name in CHECKS if seen(record, name))})" for record in single]
+    single = [record for record in faulty if sum(is_seen(record, name) for name in CHECKS) == 1]
+    told = [f"{record['fault']} ({next(name for name in CHECKS if is_seen(record, name))})" for record in single]
     return [
         Observed(
             "planted.caught",
-            SYSTEM,
+            FAULT_SYSTEM,
             "planted faults that a check catches, asymmetric vehicle",
-            sum(map(caught, faulty)),
+            sum(map(is_caught, faulty)),
             "faults",
         ).within(
             len(faulty), 0, f"every one of them is a wrong model; {len(faulty)} of {len(FAULTS)} were planted", "native"
         ),
         Observed(
             "planted.false_alarms",
-            SYSTEM,
+            FAULT_SYSTEM,
             "alarms without a fault, all checks, vehicles and implementations",
             alarms,
             "alarms",
         ).within(0, 0, "a check that cries without a fault is no check", "native"),
-        *([_hidden(faulty)] if _has_symmetric_vehicle(data) else []),
-        Observed("planted.single", SYSTEM, "planted faults that a single check catches", len(single), "faults").beside(
-            "few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"
-        ),
+        *([_hidden_faults_row(faulty)] if _has_symmetric_vehicle(data) else []),
+        Observed(
+            "planted.single", FAULT_SYSTEM, "planted faults that a single check catches", len(single), "faults"
+        ).beside("few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"),
     ]
 
 
 def _has_symmetric_vehicle(data: Saved) -> bool:
     """Whether the symmetric vehicle ran, too."""
-    return all(SYMMETRIC in record["ratios"] for record in data["faults"])
+    return all(SYMMETRIC_SET in record["ratios"] for record in data["faults"])
 
 
-def _hidden(faulty: list[Saved]) -> Row:
-    missed = [record for record in faulty if not caught(record, SYMMETRIC)]
+def _hidden_faults_row(faulty: list[Saved]) -> Row:
+    missed = [record for record in faulty if not is_caught(record, SYMMETRIC_SET)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
     return Observed(
-        "planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed), "faults"
-    ).within(len(HIDDEN), 0, why, "native")
+        "planted.hidden",
+        FAULT_SYSTEM,
+        "planted faults that the symmetric vehicle of the paper hides",
+        len(missed),
+        "faults",
+    ).within(len(HIDDEN_BY_SYMMETRY), 0, why, "native")
 
 
 def lines(data: Saved) -> list[tuple[str, ...]]:
@@ -147,8 +151,8 @@ def lines(data: Saved) -> list[tuple[str, ...]]:
             "pitch-plane",
             f"{record['place']} of the vehicle",
             record["fault"],
-            ", ".join(name for name in CHECKS if seen(record, name)) or "none",
-            ", ".join(name for name in CHECKS if not seen(record, name)),
+            ", ".join(name for name in CHECKS if is_seen(record, name)) or "none",
+            ", ".join(name for name in CHECKS if not is_seen(record, name)),
         )
         for record in data["faults"]
     ]
@@ -168,7 +172,7 @@ def _check_table(data: Saved) -> Table:
             for vehicle in record["ratios"]
             for ratio in _ratios_of_check(record, name, vehicle)
         )
-        catches = sum(seen(record, name) for record in data["faults"])
+        catches = sum(is_seen(record, name) for record in data["faults"])
         limits = sorted({check.tolerance(engine) for engine in ("exudyn", "mujoco")})
         lines.append(
             (
@@ -191,9 +195,9 @@ def _fault_table(data: Saved) -> Table:
         (
             record["fault"],
             f"{record['place']} ({', '.join(record['engines'])})",
-            ", ".join(f"{name} {_size(record, name)}" for name in CHECKS if seen(record, name)),
-            ", ".join(name for name in CHECKS if not seen(record, name)) or "-",
-            "not run" if not _has_symmetric_vehicle(data) else "no" if caught(record, SYMMETRIC) else "yes",
+            ", ".join(f"{name} {_size_text(record, name)}" for name in CHECKS if is_seen(record, name)),
+            ", ".join(name for name in CHECKS if not is_seen(record, name)) or "-",
+            "not run" if not _has_symmetric_vehicle(data) else "no" if is_caught(record, SYMMETRIC_SET) else "yes",
         )
         for record in data["faults"]
     )
@@ -209,11 +213,11 @@ def _fault_table(data: Saved) -> Table:
     )
 
 
-def _size(record: Saved, name: str) -> str:
+def _size_text(record: Saved, name: str) -> str:
     """Text with the check's smallest error among the engines, from its ratio to the tolerance."""
     sizes = [
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
-        for engine, ratios in record["ratios"][TWIN].items()
+        for engine, ratios in record["ratios"][ASYMMETRIC_SET].items()
     ]
     least = min(sizes)
     return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
@@ -225,10 +229,13 @@ def draw(data: Saved) -> Drawn:
         return []
     from validation.faults.figure import fault_map
 
-    vehicles = {TWIN: "asymmetric vehicle", SYMMETRIC: "symmetric vehicle (the paper's)"}
+    vehicles = {ASYMMETRIC_SET: "asymmetric vehicle", SYMMETRIC_SET: "symmetric vehicle (the paper's)"}
     records = data["faults"]
-    depth = {vehicle: [[least(record, name, vehicle) for name in CHECKS] for record in records] for vehicle in vehicles}
-    marks = [not caught(record, SYMMETRIC) for record in records]
+    depth = {
+        vehicle: [[smallest_ratio(record, name, vehicle) for name in CHECKS] for record in records]
+        for vehicle in vehicles
+    }
+    marks = [not is_caught(record, SYMMETRIC_SET) for record in records]
     figure = fault_map([record["fault"] for record in records], tuple(CHECKS), depth, vehicles, marks)
     caption = (
         "Decades between what a check finds and its tolerance; white: not seen. Left the asymmetric twin, right "

@@ -1,7 +1,7 @@
 """Faults, planted one at a time into what one engine is given, into its adapter or into the equations.
 
 A check that has never seen a fault proves nothing. Each fault here is a mistake that is easily made in
-such code; ``planted`` gives an engine with it, and outside of the engine's work nothing is changed.
+such code; ``planted_builder`` gives an engine with it, and outside of the engine's work nothing is changed.
 """
 
 import math
@@ -18,11 +18,11 @@ from validation.common.checks import Make
 from validation.faults import changes as change
 from validation.faults import patches
 from validation.faults.changes import Change
-from validation.faults.patches import Context, Patch, attribute, rewritten
+from validation.faults.patches import Context, Patch, attribute_patch, rewritten_reference
 
 BOTH_ENGINES = ("exudyn", "mujoco")
-EXUDYN, MUJOCO, HAND = ("exudyn",), ("mujoco",), ("reference",)
-FORCES = ("force", "pitch")
+EXUDYN_ONLY, MUJOCO_ONLY, REFERENCE_ONLY = ("exudyn",), ("mujoco",), ("reference",)
+FORCE_FUNCTIONS = ("force", "pitch")
 
 
 def _as_asked(settings: Settings) -> Settings:
@@ -41,7 +41,7 @@ class EngineFault:
 
 
 @dataclass
-class Planted:
+class PlantedModel:
     """An engine's model with a fault that is active only while the model computes."""
 
     context: Context
@@ -62,39 +62,39 @@ class Planted:
         return self.model.plan()
 
 
-def planted(fault: EngineFault, engine: str) -> Make:
+def planted_builder(fault: EngineFault, engine: str) -> Make:
     """A function that builds models with the fault in an engine, in the form that the checks expect."""
 
-    def make(assembly: Assembly, settings: Settings) -> Planted:
+    def make(assembly: Assembly, settings: Settings) -> PlantedModel:
         context = fault.inside()
         with context():
-            return Planted(context, build(engine, fault.change(assembly), fault.settings(settings)))
+            return PlantedModel(context, build(engine, fault.change(assembly), fault.settings(settings)))
 
     return make
 
 
-def _euler(settings: Settings) -> Settings:
+def _first_order_settings(settings: Settings) -> Settings:
     """Fault: a first-order integrator is used instead of Runge-Kutta."""
     lower = {"RK44": "ExplicitEuler", "RK4": "Euler"}
     return replace(settings, integrator=lower.get(settings.integrator, settings.integrator))
 
 
-CLEAN = (
-    EngineFault("no fault", (*BOTH_ENGINES, *HAND)),
-    EngineFault("no fault, equations interpreted", HAND, inside=rewritten()),
+CONTROLS_WITHOUT_FAULT = (
+    EngineFault("no fault", (*BOTH_ENGINES, *REFERENCE_ONLY)),
+    EngineFault("no fault, equations interpreted", REFERENCE_ONLY, inside=rewritten_reference()),
 )
 
 DESCRIPTION_FAULTS = (
     EngineFault("a and b swapped", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: a if x > 0 else -b)),
     EngineFault("sign of pitch mirrored", BOTH_ENGINES, change.with_moved_points(lambda x, a, b: -x)),
-    EngineFault("front and rear suspension swapped", BOTH_ENGINES, change.swapped("suspension3", "suspension4")),
-    EngineFault("front and rear tyre swapped", BOTH_ENGINES, change.swapped("tyre1", "tyre2")),
+    EngineFault("front and rear suspension swapped", BOTH_ENGINES, change.swapped_struts("suspension3", "suspension4")),
+    EngineFault("front and rear tyre swapped", BOTH_ENGINES, change.swapped_struts("tyre1", "tyre2")),
     EngineFault("front and rear wheel mass swapped", BOTH_ENGINES, change.bodies(change.swapped_wheel)),
     EngineFault("mass and pitch inertia of the chassis exchanged", BOTH_ENGINES, change.bodies(change.mixed_inertia)),
     EngineFault("pitch inertia about the front axle", BOTH_ENGINES, change.inertia_about_axle),
-    EngineFault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened("suspension3", 1.01)),
-    EngineFault("front suspension in N/mm", BOTH_ENGINES, change.stiffened("suspension3", 1e-3)),
-    EngineFault("tyre damping dropped", BOTH_ENGINES, change.struts(change.undamped_tyre)),
+    EngineFault("front suspension 1 % too stiff", BOTH_ENGINES, change.stiffened_strut("suspension3", 1.01)),
+    EngineFault("front suspension in N/mm", BOTH_ENGINES, change.stiffened_strut("suspension3", 1e-3)),
+    EngineFault("tyre damping dropped", BOTH_ENGINES, change.replaced_struts(change.undamped_tyre)),
     EngineFault(
         "linear geometry where exact was asked for",
         BOTH_ENGINES,
@@ -103,9 +103,13 @@ DESCRIPTION_FAULTS = (
     EngineFault("gravity upward", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=-v.gravity))),
     EngineFault("gravity 9.80665 for 9.81", BOTH_ENGINES, change.vehicle(lambda v: replace(v, gravity=9.80665))),
     EngineFault("start from zero heave", BOTH_ENGINES, change.unstressed_start),
-    EngineFault("dead band missing", BOTH_ENGINES, change.springs(lambda spring: replace(spring, dead_band=0.0))),
     EngineFault(
-        "dead band counted as a width", BOTH_ENGINES, change.springs(lambda s: replace(s, dead_band=s.dead_band / 2))
+        "dead band missing", BOTH_ENGINES, change.replaced_springs(lambda spring: replace(spring, dead_band=0.0))
+    ),
+    EngineFault(
+        "dead band counted as a width",
+        BOTH_ENGINES,
+        change.replaced_springs(lambda s: replace(s, dead_band=s.dead_band / 2)),
     ),
 )
 """In the description that an engine is built from."""
@@ -113,85 +117,119 @@ DESCRIPTION_FAULTS = (
 INPUT_FAULTS = (
     EngineFault("input half a sample late", BOTH_ENGINES, change.with_late_input(0.5)),
     EngineFault("input a whole sample late", BOTH_ENGINES, change.with_late_input(1.0)),
-    EngineFault("road held at the middle stages", BOTH_ENGINES, change.driven(("road",), change.HeldStages)),
+    EngineFault("road held at the middle stages", BOTH_ENGINES, change.replaced_input(("road",), change.HeldStages)),
     EngineFault("rear wheel ahead of the front one", BOTH_ENGINES, change.road(wheelbase=-1.0)),
     EngineFault("rear delay missing", BOTH_ENGINES, change.road(wheelbase=0.0)),
     EngineFault("speed in km/h", BOTH_ENGINES, change.road(speed=3.6)),
-    EngineFault("rate of the road missing", BOTH_ENGINES, change.channels(("road",), change.times({2: 0.0, 3: 0.0}))),
-    EngineFault("left track instead of the mean", BOTH_ENGINES, change.driven(("road",), change.OtherTrack)),
-    EngineFault("wheel forces in kN", BOTH_ENGINES, change.channels(FORCES, change.times({0: 1e-3, 1: 1e-3}))),
     EngineFault(
-        "wheel forces with the other sign", BOTH_ENGINES, change.channels(FORCES, change.times({0: -1.0, 1: -1.0}))
+        "rate of the road missing",
+        BOTH_ENGINES,
+        change.replaced_channels(("road",), change.multiplied_channels({2: 0.0, 3: 0.0})),
     ),
-    EngineFault("front wheel force at both wheels", BOTH_ENGINES, change.channels(FORCES, change.front_twice)),
+    EngineFault("left track instead of the mean", BOTH_ENGINES, change.replaced_input(("road",), change.OtherTrack)),
+    EngineFault(
+        "wheel forces in kN",
+        BOTH_ENGINES,
+        change.replaced_channels(FORCE_FUNCTIONS, change.multiplied_channels({0: 1e-3, 1: 1e-3})),
+    ),
+    EngineFault(
+        "wheel forces with the other sign",
+        BOTH_ENGINES,
+        change.replaced_channels(FORCE_FUNCTIONS, change.multiplied_channels({0: -1.0, 1: -1.0})),
+    ),
+    EngineFault(
+        "front wheel force at both wheels", BOTH_ENGINES, change.replaced_channels(FORCE_FUNCTIONS, change.front_twice)
+    ),
     EngineFault("wheel forces along the chassis, not vertical", BOTH_ENGINES, change.body_fixed),
     EngineFault(
         "prescribed pitch in degrees",
         BOTH_ENGINES,
-        change.channels(("pitch",), change.times(dict.fromkeys((2, 3, 4), 180 / math.pi))),
+        change.replaced_channels(("pitch",), change.multiplied_channels(dict.fromkeys((2, 3, 4), 180 / math.pi))),
     ),
-    EngineFault("rate of the prescribed pitch missing", MUJOCO, change.channels(("pitch",), change.times({3: 0.0}))),
     EngineFault(
-        "rate of the prescribed heave missing", MUJOCO, change.channels(("heave-pitch",), change.times({4: 0.0}))
+        "rate of the prescribed pitch missing",
+        MUJOCO_ONLY,
+        change.replaced_channels(("pitch",), change.multiplied_channels({3: 0.0})),
+    ),
+    EngineFault(
+        "rate of the prescribed heave missing",
+        MUJOCO_ONLY,
+        change.replaced_channels(("heave-pitch",), change.multiplied_channels({4: 0.0})),
     ),
     EngineFault(
         "prescribed heave upward",
         BOTH_ENGINES,
-        change.channels(("heave-pitch",), change.times(dict.fromkeys((2, 4, 6), -1.0))),
+        change.replaced_channels(("heave-pitch",), change.multiplied_channels(dict.fromkeys((2, 4, 6), -1.0))),
     ),
-    EngineFault("added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.times({0: -1.0}))),
+    EngineFault(
+        "added moment with the other sign", BOTH_ENGINES, change.moment(0.0, change.multiplied_channels({0: -1.0}))
+    ),
     EngineFault("added moment half a sample late", BOTH_ENGINES, change.moment(0.5)),
-    EngineFault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_euler),
+    EngineFault("Euler where Runge-Kutta was asked for", BOTH_ENGINES, settings=_first_order_settings),
 )
 """In the input or the settings that an engine is run with."""
 
 ADAPTER_FAULTS = (
     EngineFault(
         "held sample of the step's end",
-        EXUDYN,
-        inside=attribute("models.engines.exudyn:SignalClock.advance", patches.index_of_the_end),
+        EXUDYN_ONLY,
+        inside=attribute_patch("models.engines.exudyn:SignalClock.advance", patches.index_of_the_end),
     ),
     EngineFault(
         "time cut off instead of rounded",
-        EXUDYN,
-        inside=attribute("models.engines.exudyn:SignalClock.reader", patches.truncated_time),
+        EXUDYN_ONLY,
+        inside=attribute_patch("models.engines.exudyn:SignalClock.reader", patches.truncated_time),
     ),
     EngineFault(
         "constraint starts without its acceleration",
-        EXUDYN,
-        inside=attribute("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
+        EXUDYN_ONLY,
+        inside=attribute_patch("models.engines.exudyn:ExudynModel._consistent_start", patches.reset_accelerations),
     ),
     EngineFault(
         "enforced moment with the other sign",
-        EXUDYN,
-        inside=attribute("models.engines.exudyn:ExudynModel._enforced", patches.negative),
+        EXUDYN_ONLY,
+        inside=attribute_patch("models.engines.exudyn:ExudynModel._enforced", patches.negated_result),
     ),
     EngineFault(
         "gravity missing on one wheel",
-        MUJOCO,
-        inside=attribute("models.engines.mujoco:specification", patches.weightless_wheel),
+        MUJOCO_ONLY,
+        inside=attribute_patch("models.engines.mujoco:specification", patches.weightless_wheel),
     ),
     EngineFault(
         "strut measured along the rotating body",
-        MUJOCO,
-        inside=attribute("models.engines.mujoco:_suspension", patches.turning_reference),
+        MUJOCO_ONLY,
+        inside=attribute_patch("models.engines.mujoco:_suspension", patches.turning_reference),
     ),
     EngineFault(
         "chassis row of eq. (39) with the other sign",
-        MUJOCO,
-        inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row),
+        MUJOCO_ONLY,
+        inside=attribute_patch("models.engines.mujoco:_guidance", patches.misprinted_row),
     ),
     EngineFault(
-        "callback never installed", MUJOCO, inside=attribute("models.engines.mujoco:installed", patches.not_installed)
+        "callback never installed",
+        MUJOCO_ONLY,
+        inside=attribute_patch("models.engines.mujoco:installed", patches.not_installed),
     ),
 )
 """In the code of an engine's adapter."""
 
 EQUATIONS_FAULTS = (
-    EngineFault("cos(pitch) missing in the moment", HAND, inside=rewritten(newton_euler=patches.moment_without_cosine)),
-    EngineFault("cos(pitch) missing in the damper", HAND, inside=rewritten(suspension=patches.damper_without_cosine)),
-    EngineFault("forces from the state before", HAND, inside=rewritten(suspension=patches.stale_state)),
-    EngineFault("no reaction on the front wheel", HAND, inside=rewritten(newton_euler=patches.no_reaction)),
+    EngineFault(
+        "cos(pitch) missing in the moment",
+        REFERENCE_ONLY,
+        inside=rewritten_reference(newton_euler=patches.moment_without_cosine),
+    ),
+    EngineFault(
+        "cos(pitch) missing in the damper",
+        REFERENCE_ONLY,
+        inside=rewritten_reference(suspension=patches.damper_without_cosine),
+    ),
+    EngineFault(
+        "forces from the state before", REFERENCE_ONLY, inside=rewritten_reference(suspension=patches.stale_state)
+    ),
+    EngineFault(
+        "no reaction on the front wheel", REFERENCE_ONLY, inside=rewritten_reference(newton_euler=patches.no_reaction)
+    ),
 )
 """In the hand-written equations."""
 

@@ -9,21 +9,21 @@ import numpy as np
 
 from models.engines.spatial_reference import SpatialReference
 from models.ride.closed_forms import QuarterCar
-from models.ride.covariance import stationary
+from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem
-from models.ride.frequency import quadrature
-from models.ride.weighting import WEIGHTINGS, weighting
+from models.ride.frequency import variances_by_quadrature
+from models.ride.weighting import WEIGHTINGS, weighting_of_standard
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, poles
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
-from validation.ride.rides import R19_FREQUENCIES, STANDARD, off
+from validation.faults.patches import Patch, attribute_patch
+from validation.ride.rides import R19_FREQUENCIES, STANDARD_WEIGHTINGS, largest_relative_error
 
 SPEED = 17.0
-INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
+PUBLISHED_INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
 """Published inertia (kg m^2) of the whole sprung mass of R19, which body and engine share."""
 
 
@@ -32,22 +32,22 @@ def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[Lin
 
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(name))
     met = road(vehicle)
-    return vehicle, met, excited.excited(vehicle, met, SPEED)
+    return vehicle, met, excited.vehicle_with_road(vehicle, met, SPEED)
 
 
 def _one_track(vehicle: LinearVehicle) -> Excitation:
-    return two_track.excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
+    return two_track.road_excitation(two_track.road_of_level(1.0), two_track.on_track(vehicle.wheels, 1.0))
 
 
 @cache
 def _by_frequency() -> np.ndarray:
     vehicle, road, _ = _system("half_car", _one_track)
-    return quadrature(vehicle, road, SPEED).variance
+    return variances_by_quadrature(vehicle, road, SPEED).variance
 
 
-def _quadrature() -> float:
+def _quadrature_errors() -> float:
     """Errors of the half car's variances against integrals over its spectra."""
-    return off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
+    return largest_relative_error(stationary_covariance(_system("half_car", _one_track)[2]).variance, _by_frequency())
 
 
 def _closed_form() -> float:
@@ -55,9 +55,9 @@ def _closed_form() -> float:
     file."""
     q, corner = 1e-4, 0.3
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
-    variance = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
+    variance = stationary_covariance(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
-    return off(variance, car.body_acceleration(q * SPEED, corner * SPEED))
+    return largest_relative_error(variance, car.body_acceleration(q * SPEED, corner * SPEED))
 
 
 @cache
@@ -69,7 +69,7 @@ def _covariance_of_heights() -> np.ndarray:
     return np.append(np.diag(P), P[np.ix_(left, left)].sum())
 
 
-def _heights() -> float:
+def _road_height_errors() -> float:
     """Errors of the road heights under the wheels of R19-ride by filters and delays, against their covariance in closed
     form."""
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
@@ -77,23 +77,23 @@ def _heights() -> float:
     left = sum(unit[i] for i, wheel in enumerate(vehicle.wheels) if wheel.y > 0)
     rows = [*unit, left]
     outputs = tuple(Output(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
-    road = two_track.excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
+    road = two_track.road_excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
     from models.ride import excited
 
-    variance = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
-    return off(variance, _covariance_of_heights())
+    variance = stationary_covariance(excited.vehicle_with_road(replace(vehicle, outputs=outputs), road, SPEED)).variance
+    return largest_relative_error(variance, _covariance_of_heights())
 
 
 def _published_road() -> float:
     """Error of the variance of one track of the paper's road, against pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
     covariance = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
-    return off(covariance, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
+    return largest_relative_error(covariance, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
 def _frequencies() -> float:
     """Errors of the 19 eigenfrequencies of R19-ride, against those that belong to its data."""
     rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
-    return off(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
+    return largest_relative_error(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
 def _whole_inertia() -> float:
@@ -106,30 +106,30 @@ def _whole_inertia() -> float:
     for part in parts:
         arm = np.array(part.position) - centre
         total += np.array(part.inertia) + part.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return float(np.abs(total - INERTIA).max() / INERTIA.max())
+    return float(np.abs(total - PUBLISHED_INERTIA).max() / PUBLISHED_INERTIA.max())
 
 
 @cache
-def _by_hand(name: str) -> np.ndarray:
+def _hand_written_accelerations(name: str) -> np.ndarray:
     vehicle = vehicle_file.load_vehicle(name)
-    return SpatialReference(vehicle, SPEED).acceleration(0.0, *_state(vehicle))
+    return SpatialReference(vehicle, SPEED).acceleration(0.0, *_small_state(vehicle))
 
 
-def _state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _small_state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A small state with coordinates, rates and road that are all different, so that no errors cancel."""
     n, w = len(vehicle.coordinates()), len(vehicle.tyres)
     return 1e-7 * np.cos(np.arange(n)), 1e-6 * np.sin(1.0 + np.arange(n)), 1e-7 * np.cos(0.7 * np.arange(2 * w))
 
 
-def _equations() -> float:
+def _acceleration_errors() -> float:
     """Errors of the accelerations of R19-ride and R19-free at a small state, against equations written by hand."""
     sizes = []
     for name in ("r19_ride", "r19_free"):
         vehicle = vehicle_file.load_vehicle(name)
-        linear, (q, v, road) = spatial_linear.linearise(vehicle, SPEED), _state(vehicle)
+        linear, (q, v, road) = spatial_linear.linearise(vehicle, SPEED), _small_state(vehicle)
         z, rate = np.split(road, 2)
         force = linear.road_stiffness @ z + linear.road_damping @ rate - linear.stiffness @ q - linear.damping @ v
-        accelerations, wanted = np.linalg.solve(linear.mass, force), _by_hand(name)
+        accelerations, wanted = np.linalg.solve(linear.mass, force), _hand_written_accelerations(name)
         sizes.append(float(np.abs(accelerations - wanted).max() / np.abs(wanted).max()))
     return max(sizes)
 
@@ -139,23 +139,23 @@ def _states_of_weighting() -> float:
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
     response = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
-    return off(response, WEIGHTINGS["Wk"].response(frequency))
+    return largest_relative_error(response, WEIGHTINGS["Wk"].response(frequency))
 
 
 def _table_of_weighting() -> float:
     """Relative errors of Wk against the standard's table."""
-    frequency, wk, _ = np.array(STANDARD).T
-    return off(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
+    frequency, wk, _ = np.array(STANDARD_WEIGHTINGS).T
+    return largest_relative_error(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
 
 
 CHECKS = {
-    "quadrature": Check("half car: variances, spectra integrated", "relative", 1e-9, _quadrature),
+    "quadrature": Check("half car: variances, spectra integrated", "relative", 1e-9, _quadrature_errors),
     "closed form": Check("quarter car: body acceleration in closed form", "relative", 1e-10, _closed_form),
-    "heights": Check("R19-ride: road under its wheels in closed form", "relative", 1e-10, _heights),
+    "heights": Check("R19-ride: road under its wheels in closed form", "relative", 1e-10, _road_height_errors),
     "paper's road": Check("variance of a track of the paper's road", "relative", 1e-12, _published_road),
     "frequencies": Check("R19-ride: 19 eigenfrequencies of its data", "relative", 1e-5, _frequencies),
     "whole inertia": Check("R19-free: published inertia of body with engine", "of the largest", 1e-9, _whole_inertia),
-    "equations": Check("R19: accelerations by hand-written equations", "of the largest", 1e-5, _equations),
+    "equations": Check("R19: accelerations by hand-written equations", "of the largest", 1e-5, _acceleration_errors),
     "Wk's formula": Check("Wk: states against its sections", "relative", 1e-12, _states_of_weighting),
     "Wk's table": Check("Wk: the standard's table", "relative", 5e-3, _table_of_weighting),
 }
@@ -163,14 +163,16 @@ CHECKS = {
 
 def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
     """Fault: every vehicle is changed as it is loaded."""
-    return attribute(
+    return attribute_patch(
         "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change(real(*arguments))
     )
 
 
-def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
+def _excited_patch(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
     """Fault: change(system, speed) replaces every excited linear system."""
-    return attribute("models.ride.excited:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed))
+    return attribute_patch(
+        "models.ride.excited:vehicle_with_road", lambda real: lambda v, e, speed: change(real(v, e, speed), speed)
+    )
 
 
 def _reversed(original: Any) -> Any:
@@ -194,7 +196,7 @@ def _other_twist(original: Any) -> Any:
     return lambda motion, bar: 2.0 * motion.coordinate(bar.body, "rx") - original(motion, bar)
 
 
-def _mirrored(vehicle: SpatialVehicle) -> SpatialVehicle:
+def _mirrored_body(vehicle: SpatialVehicle) -> SpatialVehicle:
     """Fault: the heaviest body's centre of mass is as far behind the middle as it was ahead of it."""
     heavy = max(vehicle.bodies, key=lambda body: body.mass)
     x, y, z = heavy.position
@@ -212,7 +214,7 @@ def _other_products(vehicle: SpatialVehicle) -> SpatialVehicle:
 
 
 def _wrong_wk(original: Any) -> Any:
-    return {**original, "Wk": weighting("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
+    return {**original, "Wk": weighting_of_standard("Wk", (12.5, 12.5, 0.63), (3.35, 0.91, 2.37, 0.91))}
 
 
 def _lossy(original: Any) -> Any:
@@ -227,43 +229,48 @@ def _lossy(original: Any) -> Any:
 
 FAULTS = (
     CampaignFault(
-        "rear axle ahead of the front one", "covariance", attribute("models.ride.covariance:hits", _reversed)
+        "rear axle ahead of the front one",
+        "covariance",
+        attribute_patch("models.ride.covariance:noise_arrivals", _reversed),
     ),
     CampaignFault(
         "cross terms of the axles missing",
         "covariance",
-        attribute(
-            "models.ride.covariance:_responses", lambda real: lambda A, met, moved: [np.zeros_like(b) for b in met.B]
+        attribute_patch(
+            "models.ride.covariance:_responses_before_arrival",
+            lambda real: lambda A, met, moved: [np.zeros_like(b) for b in met.B],
         ),
     ),
     CampaignFault(
         "noise without the root of the speed",
         "road",
-        _excited(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B))),
+        _excited_patch(lambda own, v: replace(own, B=tuple(b / v**0.5 for b in own.B))),
     ),
     CampaignFault(
         "noise with the speed, not its root",
         "road",
-        _excited(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B))),
+        _excited_patch(lambda own, v: replace(own, B=tuple(b * v**0.5 for b in own.B))),
     ),
     CampaignFault(
         "delay by the speed in km/h",
         "road",
-        _excited(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays))),
+        _excited_patch(lambda own, v: replace(own, delays=tuple(tau / 3.6 for tau in own.delays))),
     ),
-    CampaignFault("rear wheels on the front track", "road", attribute("models.road.two_track:_row", _on_front_track)),
+    CampaignFault(
+        "rear wheels on the front track", "road", attribute_patch("models.road.two_track:_height_row", _on_front_track)
+    ),
     CampaignFault(
         "one-sided level taken for two-sided",
         "road",
-        attribute(
+        attribute_patch(
             "models.road.two_track:road_of_level",
-            lambda real: lambda y, level=two_track.LEVEL, **own: real(y, 2.0 * level, **own),
+            lambda real: lambda y, level=two_track.TRACK_DENSITY_LEVEL, **own: real(y, 2.0 * level, **own),
         ),
     ),
-    CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored)),
+    CampaignFault("a and b swapped", "vehicle", _vehicle(_mirrored_body)),
     CampaignFault("sign of the products of inertia", "vehicle", _vehicle(_other_products)),
     CampaignFault(
-        "sign of the anti-roll bar", "vehicle", attribute("models.vehicles.spatial_linear:_twist", _other_twist)
+        "sign of the anti-roll bar", "vehicle", attribute_patch("models.vehicles.spatial_linear:_twist", _other_twist)
     ),
     CampaignFault(
         "tyre stiffness per axle for per wheel",
@@ -271,10 +278,12 @@ FAULTS = (
         _vehicle(lambda own: replace(own, tyres=tuple(replace(t, stiffness=2 * t.stiffness) for t in own.tyres))),
     ),
     CampaignFault(
-        "Wk: upward step turned round", "weighting", attribute("validation.faults.ride:WEIGHTINGS", _wrong_wk)
+        "Wk: upward step turned round", "weighting", attribute_patch("validation.faults.ride:WEIGHTINGS", _wrong_wk)
     ),
     CampaignFault(
-        "Wk: a section hears too little", "weighting", attribute("models.ride.weighting:Weighting.matrices", _lossy)
+        "Wk: a section hears too little",
+        "weighting",
+        attribute_patch("models.ride.weighting:Weighting.matrices", _lossy),
     ),
 )
 

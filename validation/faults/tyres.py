@@ -12,11 +12,11 @@ from models.systems.handling.run import build
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
-from validation.spatial.cars import cornering_error, mirrored
+from validation.faults.patches import Patch, attribute_patch
+from validation.spatial.cars import cornering_error, mirrored_coordinates
 
 
-def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
+def car_in_a_turn(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
     """The vehicle R19-free steered into a turn at 25 m/s, and a state within the turn."""
     car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
     q, v = car.straight(25.0)
@@ -33,7 +33,7 @@ def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
 
 
 def _accelerations(engine: str, steer: float = 0.05) -> np.ndarray:
-    car, q, v = turning(steer)
+    car, q, v = car_in_a_turn(steer)
     return build(engine, car).acceleration(0.0, q, v)
 
 
@@ -42,34 +42,34 @@ def _by_exudyn() -> np.ndarray:
     return _accelerations("exudyn")
 
 
-def _mirror() -> float:
+def _mirror_error() -> float:
     return largest_relative_difference(
-        mirrored(turning()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco")
+        mirrored_coordinates(car_in_a_turn()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco")
     )
 
 
-def _read(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _read_report(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     report, ledger = np.empty((1, len(car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
     at.reports(car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
-def _balance() -> float:
+def _energy_balance_error() -> float:
     """Error of the energy balance along the motion, divided by the largest power of a tyre."""
-    car, q, v = turning()
-    a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read(car, q, v)
+    car, q, v = car_in_a_turn()
+    a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read_report(car, q, v)
     ends = [
-        bodies_energy(car, here, rate) + _read(car, here, rate)[1][at.POTENTIAL]
+        bodies_energy(car, here, rate) + _read_report(car, here, rate)[1][at.POTENTIAL]
         for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))
     ]
     power = ledger[at.DISSIPATED] + ledger[at.TORQUE_POWER] + ledger[at.STEER_POWER] + report[:, at.POWER].sum()
     return float(abs((ends[0] - ends[1]) / 2e-5 - power) / np.abs(report[:, at.POWER]).max())
 
 
-def _sliding() -> float:
+def _locked_wheel_error() -> float:
     """Error of the force on locked wheels, which should be mu N against the sliding velocity."""
     car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
-    report, _ = _read(car, *car.straight(15.0))
+    report, _ = _read_report(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
 
 
@@ -80,12 +80,12 @@ CHECKS = {
         1e-10,
         lambda: largest_relative_difference(_accelerations("mujoco"), _by_exudyn()),
     ),
-    "mirror": Check("accelerations of the mirror image", "of the largest", 1e-10, _mirror),
-    "balance": Check("change of energy by the powers", "of the tyres'", 1e-6, _balance),
+    "mirror": Check("accelerations of the mirror image", "of the largest", 1e-10, _mirror_error),
+    "balance": Check("change of energy by the powers", "of the tyres'", 1e-6, _energy_balance_error),
     "cornering": Check(
-        "cornering stiffness of the ride vehicle", "relative", 1e-3, lambda: cornering_error(turning()[0])
+        "cornering stiffness of the ride vehicle", "relative", 1e-3, lambda: cornering_error(car_in_a_turn()[0])
     ),
-    "sliding": Check("locked wheels by mu N", "relative", 1e-9, _sliding),
+    "sliding": Check("locked wheels by mu N", "relative", 1e-9, _locked_wheel_error),
 }
 
 
@@ -105,7 +105,7 @@ def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), offset: floa
 
         return made
 
-    return attribute("models.multibody.numbers:table", table)
+    return attribute_patch("models.multibody.numbers:table", table)
 
 
 FAULTS = tuple(

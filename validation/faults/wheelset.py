@@ -14,13 +14,13 @@ from models.engines.wheelset import MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import wavelength
-from models.rail.energy import energies, rates_and_powers
+from models.rail.energy import energies_at_states, rates_and_powers
 from models.rail.equations import Equations
-from models.rail.linear import klingel
-from models.rail.wheelset import CHOSEN
+from models.rail.linear import klingel_wavelength
+from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Context, Patch, attribute, with_globals
+from validation.faults.patches import Context, Patch, attribute_patch, with_globals
 
 Law = Literal["linear", "fastsim"]
 STATES = np.array(
@@ -30,15 +30,15 @@ STATES = np.array(
     ]
 )
 """Moved from rest (m, rad, m/s, rad/s): the second one slides all over."""
-MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
-SPEED, SLIDING = 60.0, 1
+MIRROR_SIGNS = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
+SPEED, SLIDING_STATE = 60.0, 1
 HALF_DIFFERENCE_TIME = 1e-6
 """s: half the time over which energies are differentiated."""
 
 
 def equations(law: Law = "fastsim") -> Equations:
     """Equations of the chosen wheelset, with few contact cells."""
-    return Equations(CHOSEN, SPEED, law, 7)
+    return Equations(CHOSEN_WHEELSET, SPEED, law, 7)
 
 
 @cache
@@ -50,7 +50,7 @@ def states() -> Array:
 @cache
 def by_engine() -> Array:
     """Time derivatives (2, 10) of these states by MuJoCo."""
-    built = MujocoWheelset(CHOSEN, SPEED, cells=7)
+    built = MujocoWheelset(CHOSEN_WHEELSET, SPEED, cells=7)
     return np.array([built.rates(state) for state in states()])
 
 
@@ -61,12 +61,14 @@ def _engine() -> float:
     )
 
 
-def _mirror() -> float:
+def _mirror_error() -> float:
     rates = equations().rates
-    return max(largest_relative_difference(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
+    return max(
+        largest_relative_difference(MIRROR_SIGNS * rates(MIRROR_SIGNS * state), rates(state)) for state in states()
+    )
 
 
-def _balance() -> float:
+def _energy_balance_error() -> float:
     """Largest error of the balance of energy, divided by the largest power.
 
     The change of kinetic, spring and potential energy is taken by central differences along the motion.
@@ -74,39 +76,39 @@ def _balance() -> float:
     written, there = equations(), states()
     rates, powers = rates_and_powers(written, there)
     ahead, behind = (
-        np.sum(energies(written, there + part * HALF_DIFFERENCE_TIME * rates), axis=0) for part in (1.0, -1.0)
+        np.sum(energies_at_states(written, there + part * HALF_DIFFERENCE_TIME * rates), axis=0) for part in (1.0, -1.0)
     )
     stored, driven, *lost = powers.T
     missing = (ahead - behind) / (2.0 * HALF_DIFFERENCE_TIME) + stored - driven + sum(lost)
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 
-def _report(state: Array, law: Law = "fastsim") -> Array:
+def _contact_report(state: Array, law: Law = "fastsim") -> Array:
     return equations(law).at(state[None])[1][0]
 
 
 def _friction() -> float:
     """Relative difference of the creep forces of fully sliding wheels from mu N; infinite if a contact gains energy."""
-    report = _report(states()[SLIDING])
+    report = _contact_report(states()[SLIDING_STATE])
     if report["power"].max() > 0.0:
         return np.inf
-    bound = CHOSEN.friction * report["load"]
+    bound = CHOSEN_WHEELSET.friction * report["load"]
     return float(np.abs(np.hypot(report["fx"], report["fy"]) / bound - 1.0).max())
 
 
 def _spin_and_load_at_rest() -> float:
     """Errors of the spin and the carried load at rest."""
     rest = equations().rest
-    report = _report(rest)
+    report = _contact_report(rest)
     up = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
-    return max(abs(rest[eq.SPIN] * CHOSEN.radius / SPEED + 1.0), abs(up.sum() / CHOSEN.load - 1.0))
+    return max(abs(rest[eq.SPIN] * CHOSEN_WHEELSET.radius / SPEED + 1.0), abs(up.sum() / CHOSEN_WHEELSET.load - 1.0))
 
 
-def _linear() -> float:
+def _linear_law_error() -> float:
     """Error of the linear law's creep forces and moment against Kalker's theory at the reported creepages."""
-    report = _report(states()[0], "linear")
+    report = _contact_report(states()[0], "linear")
     a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
-    wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
+    wanted = kalker(a, b, x, y, spin, CHOSEN_WHEELSET.pair)
     return max(
         largest_relative_difference(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True)
     )
@@ -114,21 +116,21 @@ def _linear() -> float:
 
 CHECKS = {
     "engine": Check("rates at two states by MuJoCo", "of the largest", 1e-10, _engine),
-    "mirror": Check("rates of the mirror image", "of the largest", 1e-12, _mirror),
-    "balance": Check("change of energy by the powers", "of the largest", 1e-6, _balance),
+    "mirror": Check("rates of the mirror image", "of the largest", 1e-12, _mirror_error),
+    "balance": Check("change of energy by the powers", "of the largest", 1e-6, _energy_balance_error),
     "friction": Check("force of sliding wheels by mu N, little of it by spin, no power", "relative", 1e-3, _friction),
     "wave": Check(
         "Klingel's wavelength in closed form",
         "relative",
         1e-3,
-        lambda: abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0),
+        lambda: abs(wavelength(Equations, CHOSEN_WHEELSET) / klingel_wavelength(CHOSEN_WHEELSET) - 1.0),
     ),
     "rest": Check("spin and load at rest", "relative", 1e-5, _spin_and_load_at_rest),
-    "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear),
+    "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear_law_error),
 }
 
 
-def written(**functions: Any) -> Patch:
+def plain_python_patch(**functions: Any) -> Patch:
     """Patch that runs the equations as plain Python, contact by contact, with some functions replaced."""
 
     def prepare() -> Context:
@@ -145,7 +147,7 @@ def written(**functions: Any) -> Patch:
     return prepare
 
 
-def after(change: Callable[..., None]) -> Patch:
+def after_rates_patch(change: Callable[..., None]) -> Patch:
     """Patch that changes the time derivatives after their computation by change(state, body, rates)."""
 
     def with_change(original: Any) -> Any:
@@ -155,32 +157,32 @@ def after(change: Callable[..., None]) -> Patch:
 
         return rates
 
-    return attribute("models.rail.equations:rates", with_change)
+    return attribute_patch("models.rail.equations:rates", with_change)
 
 
-def creeping(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
+def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
     """Patch of the creep law: contacts and slip are changed by change(contacts, slip) before it, or the speed is
     multiplied by a factor."""
 
     def creep(contacts: Any, slip: Any, velocity: float, *rest: Any) -> None:
         contacts, slip = contacts.copy(), slip.copy()
         change(contacts, slip)
-        wf.creep(contacts, slip, speed * velocity, *rest)
+        wf.fill_creep_forces(contacts, slip, speed * velocity, *rest)
 
-    return written(creep=creep)
+    return plain_python_patch(creep=creep)
 
 
-def touching(change: Callable[[Any], None]) -> Patch:
+def contact_point_patch(change: Callable[[Any], None]) -> Patch:
     """Patch that changes the contact points."""
 
     def contact_points(pose: Any, rails: Any, touches: Any) -> None:
         wf.contact_points(pose, rails, touches)
         change(touches)
 
-    return written(contact_points=contact_points)
+    return plain_python_patch(contact_points=contact_points)
 
 
-def times(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
+def multiplied_field(name: str, factor: float, field_index: int = 0) -> Callable[..., None]:
     """Function that multiplies a field of one of its arrays by a factor."""
 
     def change(*arrays: Any) -> None:
@@ -189,20 +191,20 @@ def times(name: str, factor: float, field_index: int = 0) -> Callable[..., None]
     return change
 
 
-spin_reversed = times("turn", -1.0, field_index=1)
+spin_reversed = multiplied_field("turn", -1.0, field_index=1)
 
 
-def _shared(contacts: Any, slip: Any) -> None:
+def _share_contact(contacts: Any, slip: Any) -> None:
     contacts["load"] = contacts["load"].mean()
 
 
 def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
     """Fault: the creep law gives the spin moment the opposite sign."""
-    wf.creep(contacts, slip, *rest)
+    wf.fill_creep_forces(contacts, slip, *rest)
     rest[-1].forces["mz"] *= -1.0
 
 
-def _swapped(touches: Any) -> None:
+def _swap_contacts(touches: Any) -> None:
     """Fault: each wheel has the contact of the other wheel."""
     sides = {name: touches[name].copy() for name in ("y", "n_y")}
     touches[:] = touches[::-1].copy()
@@ -230,17 +232,21 @@ def _damped_twice(original: Any) -> Any:
 
 
 FAULTS = (
-    CampaignFault("sign of the spin creepage", "creep law", creeping(spin_reversed)),
-    CampaignFault("sign of the spin moment", "creep law", written(creep=_turned_back)),
-    CampaignFault("creepage by a speed 2 % off", "creep law", creeping(lambda contacts, slip: None, 1.02)),
-    CampaignFault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
-    CampaignFault("friction 1 % off", "creep law", creeping(times("mu", 1.01))),
-    CampaignFault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
-    CampaignFault("normal leans the other way", "contact", touching(times("n_y", -1.0))),
-    CampaignFault("arm of the contact forces 1 % off", "contact", touching(times("z", 1.01))),
-    CampaignFault("no gyroscopic moments", "body", after(_no_gyroscope)),
-    CampaignFault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
-    CampaignFault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),
+    CampaignFault("sign of the spin creepage", "creep law", creep_law_patch(spin_reversed)),
+    CampaignFault("sign of the spin moment", "creep law", plain_python_patch(creep=_turned_back)),
+    CampaignFault("creepage by a speed 2 % off", "creep law", creep_law_patch(lambda contacts, slip: None, 1.02)),
+    CampaignFault("load not distributed: both wheels have the mean", "creep law", creep_law_patch(_share_contact)),
+    CampaignFault("friction 1 % off", "creep law", creep_law_patch(multiplied_field("mu", 1.01))),
+    CampaignFault(
+        "depth, place and radius of left and right contact swapped", "contact", contact_point_patch(_swap_contacts)
+    ),
+    CampaignFault("normal leans the other way", "contact", contact_point_patch(multiplied_field("n_y", -1.0))),
+    CampaignFault("arm of the contact forces 1 % off", "contact", contact_point_patch(multiplied_field("z", 1.01))),
+    CampaignFault("no gyroscopic moments", "body", after_rates_patch(_no_gyroscope)),
+    CampaignFault("one gyroscopic moment missing", "body", after_rates_patch(_one_gyroscope)),
+    CampaignFault(
+        "dampers twice as strong", "suspension", attribute_patch("models.rail.equations:rates", _damped_twice)
+    ),
 )
 
 CAMPAIGN = Campaign("planted.wheelset", "a wheelset", "rolling-vehicle", CHECKS, FAULTS)

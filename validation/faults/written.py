@@ -21,11 +21,11 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
 from validation.common.checks import largest_relative_difference
 from validation.faults.campaign import Campaign, CampaignFault, Check
-from validation.faults.patches import Patch, attribute
+from validation.faults.patches import Patch, attribute_patch
 from validation.faults.tyres import ALL_WHEELS, tyre
 from validation.spatial.written_equations import STEP, cut_cars, cut_state, hub_input_sets, rolling_cars, rolling_states
 
-BOUND = 1e-12
+DIFFERENCE_BOUND = 1e-12
 
 
 def _on_tyres(name: str = "twin") -> float:
@@ -36,7 +36,7 @@ def _on_tyres(name: str = "twin") -> float:
     return largest_relative_difference(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
 
 
-def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
+def _hub_twin_difference(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
     """Relative difference between the accelerations of the twin on hub forces by MuJoCo and by the plain equations."""
     vehicle = cut_cars()["twin"]
     hub_inputs, (q, v) = choose(hub_input_sets(vehicle)), cut_state(vehicle, 3)
@@ -46,20 +46,31 @@ def _on_hubs(choose: Callable[[list[HubInputs]], HubInputs]) -> float:
 
 
 CHECKS = {
-    "tyres": Check("accelerations of a car on tyres by its plain equations", "of the largest", BOUND, _on_tyres),
+    "tyres": Check(
+        "accelerations of a car on tyres by its plain equations", "of the largest", DIFFERENCE_BOUND, _on_tyres
+    ),
     "towing": Check(
-        "accelerations of a train on tyres by its plain equations", "of the largest", BOUND, lambda: _on_tyres("train")
+        "accelerations of a train on tyres by its plain equations",
+        "of the largest",
+        DIFFERENCE_BOUND,
+        lambda: _on_tyres("train"),
     ),
     "hubs": Check(
-        "accelerations of a cut car on hub forces", "of the largest", BOUND, lambda: _on_hubs(lambda all_of: all_of[0])
+        "accelerations of a cut car on hub forces",
+        "of the largest",
+        DIFFERENCE_BOUND,
+        lambda: _hub_twin_difference(lambda all_of: all_of[0]),
     ),
     "road": Check(
-        "accelerations of a cut car on a road", "of the largest", BOUND, lambda: _on_hubs(lambda all_of: all_of[-2])
+        "accelerations of a cut car on a road",
+        "of the largest",
+        DIFFERENCE_BOUND,
+        lambda: _hub_twin_difference(lambda all_of: all_of[-2]),
     ),
 }
 
 
-def _preload(module: str) -> Patch:
+def _preload_patch(module: str) -> Patch:
     """Fault: the preload of one spring is 1 % too large."""
 
     def changed(original: Any) -> Any:
@@ -70,10 +81,10 @@ def _preload(module: str) -> Patch:
 
         return made
 
-    return attribute(f"{module}:preloads", changed)
+    return attribute_patch(f"{module}:preloads", changed)
 
 
-def _waves(original: Any) -> Any:
+def _scaled_wave(original: Any) -> Any:
     """Fault: the first wave of the road has a 1 % larger amplitude in the table."""
 
     def made(car: Any) -> np.ndarray:
@@ -85,7 +96,7 @@ def _waves(original: Any) -> Any:
     return made
 
 
-def _sample(original: Any) -> Any:
+def _raised_sample(original: Any) -> Any:
     """Fault: the road under the first hub is read 0.1 mm too high."""
 
     def made(vehicle: Any, hub_inputs: HubInputs, step: float) -> np.ndarray:
@@ -122,7 +133,7 @@ def _stiff_bars(original: Any) -> Any:
     return made
 
 
-def _swapped(first: int, second: int) -> Callable[[Any], Any]:
+def _swapped_numbers(first: int, second: int) -> Callable[[Any], Any]:
     """Fault: two numbers in a row of the table are exchanged."""
 
     def changed(original: Any) -> Any:
@@ -168,55 +179,57 @@ def _turned_products(inertia: np.ndarray) -> np.ndarray:
     return 2.0 * np.diag(np.diag(inertia)) - inertia
 
 
-TABLE, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
+TABLE_WRITER, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
 FAULTS = (
     CampaignFault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL_WHEELS)),
     CampaignFault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
-    CampaignFault("preload of a spring 1 % off, on tyres", "preload", _preload(TABLE)),
-    CampaignFault("preload of a spring 1 % off, cut", "preload", _preload("models.vehicles.cut_vehicle")),
-    CampaignFault("one wave of the road 1 % higher", "road", attribute(f"{TABLE}:table", _waves)),
-    CampaignFault("road under one hub 0.1 mm higher", "road", attribute("models.engines.cut_vehicle:table", _sample)),
+    CampaignFault("preload of a spring 1 % off, on tyres", "preload", _preload_patch(TABLE_WRITER)),
+    CampaignFault("preload of a spring 1 % off, cut", "preload", _preload_patch("models.vehicles.cut_vehicle")),
+    CampaignFault("one wave of the road 1 % higher", "road", attribute_patch(f"{TABLE_WRITER}:table", _scaled_wave)),
+    CampaignFault(
+        "road under one hub 0.1 mm higher", "road", attribute_patch("models.engines.cut_vehicle:table", _raised_sample)
+    ),
     CampaignFault(
         "axes of springs fixed in space",
         "frame",
-        attribute("models.multibody.plain.parts:frame_of", lambda real: lambda part, default: None),
+        attribute_patch("models.multibody.plain.parts:frame_of", lambda real: lambda part, default: None),
     ),
     CampaignFault(
         "wheels of a trailer keep to the car's heading",
         "towing",
-        attribute(f"{TABLE}:table", _of_towed(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
+        attribute_patch(f"{TABLE_WRITER}:table", _of_towed(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
     ),
     CampaignFault(
         "springs of a trailer keep to the car's heading",
         "towing",
-        attribute(f"{TABLE}:table", _of_towed(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
+        attribute_patch(f"{TABLE_WRITER}:table", _of_towed(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
     ),
-    CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute(f"{TABLE}:_bars", _stiff_bars)),
-    CampaignFault("a bar turned round, cut", "bar", attribute(f"{CUT_TABLE}:_element", _turned_bar)),
+    CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute_patch(f"{TABLE_WRITER}:_bars", _stiff_bars)),
+    CampaignFault("a bar turned round, cut", "bar", attribute_patch(f"{CUT_TABLE}:_element", _turned_bar)),
     CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
         "inertia",
-        attribute("models.systems.handling.run:Driven", _other_inertia(lambda inertia: 1.01 * inertia)),
+        attribute_patch("models.systems.handling.run:Driven", _other_inertia(lambda inertia: 1.01 * inertia)),
     ),
     CampaignFault(
         "products of inertia with the other sign, cut",
         "inertia",
-        attribute("models.engines.cut_vehicle:Driven", _other_inertia(_turned_products)),
+        attribute_patch("models.engines.cut_vehicle:Driven", _other_inertia(_turned_products)),
     ),
     CampaignFault(
         "shares of brake and drive swapped in the table",
         "packing",
-        attribute(f"{TABLE}:_tyre", _swapped(at.BRAKED, at.DRIVEN)),
+        attribute_patch(f"{TABLE_WRITER}:_tyre", _swapped_numbers(at.BRAKED, at.DRIVEN)),
     ),
     CampaignFault(
         "stiffness and damping swapped in the table, cut",
         "packing",
-        attribute(f"{CUT_TABLE}:_element", _swapped(cut_at.STIFFNESS, cut_at.DAMPING)),
+        attribute_patch(f"{CUT_TABLE}:_element", _swapped_numbers(cut_at.STIFFNESS, cut_at.DAMPING)),
     ),
     CampaignFault(
         "cornering stiffness and roll steer swapped in the table, cut",
         "packing",
-        attribute(f"{CUT_TABLE}:_hub", _swapped(cut_at.CORNERING, cut_at.ROLL_STEER)),
+        attribute_patch(f"{CUT_TABLE}:_hub", _swapped_numbers(cut_at.CORNERING, cut_at.ROLL_STEER)),
     ),
 )
 

@@ -7,28 +7,41 @@ import numpy as np
 
 from models.core.signals import Sampled
 from models.engines.protocol import build
-from models.sensors.rigid_body_motion import Start, angular_acceleration, motion, quality, spin
-from models.sensors.rotations import from_cardan, matrix
+from models.sensors.rigid_body_motion import (
+    StartState,
+    angular_acceleration,
+    fit_quality,
+    recovered_motion,
+    spin_from_readings,
+)
+from models.sensors.rotations import from_cardan, rotation_matrix
 from models.sensors.sensor_array import sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, rms, settings, vehicle
+from validation.hard_cases.setups import (
+    REFUSED,
+    driven_by_forces,
+    largest_magnitude,
+    root_mean_square,
+    settings,
+    vehicle,
+)
 
 PERIOD, NOISE = 1e-3, 0.1
-FLOOR = {
+FLOOR_SENSORS = {
     "fl": (1.1, -0.6, 0.2),
     "fr": (1.1, 0.6, 0.2),
     "rl": (-0.9, -0.6, 0.2),
     "rr": (-0.9, 0.6, 0.2),
     "mid": (0.1, 0.0, 0.2),
 }
-LIFTED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
-ROOFED = FLOOR | {"mid": (0.1, 0.0, -0.8)}
-BRACKET = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
+LIFTED_SENSORS = FLOOR_SENSORS | {"mid": (0.1, 0.0, 0.17)}
+ROOF_SENSORS = FLOOR_SENSORS | {"mid": (0.1, 0.0, -0.8)}
+BRACKET_SENSORS = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
 
 
-def _read(
+def _readings_of_run(
     engine: str,
     places: dict[str, Any],
     extra: dict[str, Any] | None = None,
@@ -54,12 +67,12 @@ def _read(
     return felt, run.states, true
 
 
-def _turning(states: np.ndarray) -> np.ndarray:
+def _angular_velocities(states: np.ndarray) -> np.ndarray:
     """Angular velocities (n, 3) in body axes of a vehicle that only pitches."""
     return states[:, 7:] * [0.0, 1.0, 0.0]
 
 
-def _plain(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
+def _pitch_acceleration(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
     """Pitch acceleration by eq. (18) as printed, by numpy's pseudo-inverse without any checks."""
     positions = np.array(list(places.values()))
     relative = np.swapaxes(specific_forces - specific_forces[:, -1:], 1, 2)[:, :, :-1]
@@ -69,94 +82,100 @@ def _plain(places: dict[str, Any], specific_forces: np.ndarray) -> np.ndarray:
 
 def plane(engine: str, folder: Path) -> float:
     """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane."""
-    felt, states, true = _read(engine, FLOOR)
-    computed = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
+    felt, states, true = _readings_of_run(engine, FLOOR_SENSORS)
+    computed = angular_acceleration(spin_from_readings(sensor_array(FLOOR_SENSORS), felt), _angular_velocities(states))[
+        :, 1
+    ]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
 def plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
-    felt, _, true = _read("reference", FLOOR)
-    part = rms(_plain(FLOOR, felt)) / rms(true)
+    felt, _, true = _readings_of_run("reference", FLOOR_SENSORS)
+    part = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
     return f"the printed formula gives {part:.2f} of the pitch acceleration"
 
 
 def nearly_plane(engine: str, folder: Path) -> float:
     """Case: noisy sensors, the fifth only 3 cm above the plane of the others. Error: rms error of the pitch
     acceleration, divided by the least that this noise can cause."""
-    felt, states, true = _read(engine, LIFTED, noise=NOISE)
-    array = sensor_array(LIFTED)
-    computed = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
-    least = array.gains(planar=True)[1]
-    return rms(computed - true) / (NOISE * least)
+    felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
+    array = sensor_array(LIFTED_SENSORS)
+    computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
+    least = array.noise_gains(planar=True)[1]
+    return root_mean_square(computed - true) / (NOISE * least)
 
 
 def nearly_plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
-    felt, _, true = _read("reference", LIFTED, noise=NOISE)
-    error = rms(_plain(LIFTED, felt) - true)
+    felt, _, true = _readings_of_run("reference", LIFTED_SENSORS, noise=NOISE)
+    error = root_mean_square(_pitch_acceleration(LIFTED_SENSORS, felt) - true)
     return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
 
 
 def bracket(engine: str, folder: Path) -> float:
     """Case: five rigid sensors and one on a flexible bracket, which must be left out."""
-    felt, states, true = _read(engine, ROOFED, BRACKET)
-    places = ROOFED | {"battery": (0.6, 0.3, 0.0)}
-    loose = quality(sensor_array(places), felt).suspect
+    felt, states, true = _readings_of_run(engine, ROOF_SENSORS, BRACKET_SENSORS)
+    places = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
+    loose = fit_quality(sensor_array(places), felt).suspect
     keep = [name != loose for name in places]
     rest = sensor_array({name: place for name, place in places.items() if name != loose})
-    computed = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
+    computed = angular_acceleration(spin_from_readings(rest, felt[:, keep]), _angular_velocities(states))[:, 1]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
 def bracket_naive(folder: Path) -> str:
     """Without the guard: the printed formula with all six sensors."""
-    felt, _, true = _read("reference", ROOFED, BRACKET)
-    wrong = largest_magnitude(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / largest_magnitude(true)
+    felt, _, true = _readings_of_run("reference", ROOF_SENSORS, BRACKET_SENSORS)
+    wrong = largest_magnitude(
+        _pitch_acceleration(ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}, felt) - true
+    ) / largest_magnitude(true)
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
 def gap(engine: str, folder: Path) -> float:
     """Case: one reading is NaN. Error: largest error of the rates."""
-    felt, states, _ = _read(engine, ROOFED)
+    felt, states, _ = _readings_of_run(engine, ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
-    return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
+    return largest_magnitude(
+        recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD).rates - _angular_velocities(states)
+    )
 
 
 def gap_naive(folder: Path) -> str:
     """Without the guard: how much of a sum over the printed formula's values is lost by one NaN."""
-    felt, _, _ = _read("reference", ROOFED)
+    felt, _, _ = _readings_of_run("reference", ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
-    lost = np.isnan(np.cumsum(_plain(ROOFED, felt))).mean()
+    lost = np.isnan(np.cumsum(_pitch_acceleration(ROOF_SENSORS, felt))).mean()
     return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
 
 
-def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, Start]:
+def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
     """A rotating vehicle in free fall with unstressed struts: readings, states and initial state."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
-    felt, states, _ = _read(engine, ROOFED, initial=start)
-    return felt, states, Start.pitched(pitch, rate)
+    felt, states, _ = _readings_of_run(engine, ROOF_SENSORS, initial=start)
+    return felt, states, StartState.pitched(pitch, rate)
 
 
 def tumbling(engine: str, folder: Path) -> float:
     """Case: the nose passes through the vertical, which an orientation by matrices must stand."""
-    felt, states, start = _falling(engine, 1.4, 3.0)
-    orientation = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
+    felt, states, start = _free_fall(engine, 1.4, 3.0)
+    orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).orientation
     none = np.zeros(len(states))
-    return largest_magnitude(matrix(orientation) - matrix(from_cardan(none, states[:, 3], none)))
+    return largest_magnitude(rotation_matrix(orientation) - rotation_matrix(from_cardan(none, states[:, 3], none)))
 
 
 def locked(engine: str, folder: Path) -> float:
     """Case: the nose points straight up, where roll and yaw are not unique. Error: largest roll or yaw that is
     given."""
-    felt, _, start = _falling(engine, np.pi / 2, 0.0)
-    return largest_magnitude(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
+    felt, _, start = _free_fall(engine, np.pi / 2, 0.0)
+    return largest_magnitude(recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).angles()[:, [0, 2]])
 
 
 def locked_naive(folder: Path) -> str:
     """Without the guard: roll by the textbook's formula at this attitude."""
-    s = matrix(from_cardan(0.3, np.pi / 2, 0.0))
+    s = rotation_matrix(from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])
     return f"the textbook's formula gives a roll of {roll:.2f} rad for 0.30, out of rounding errors"
 

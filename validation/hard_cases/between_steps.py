@@ -14,13 +14,13 @@ import numpy as np
 from models.brake.controllers import CONTROLLERS
 from models.core.discretisation import errors_of
 from models.core.errors import InputError
-from models.core.noise import normal
-from models.core.signals import sampled
-from models.core.smoothing import smoothed
+from models.core.noise import normal_samples
+from models.core.signals import signal_from_samples
+from models.core.smoothing import low_passed
 from models.fatigue.counting import level_crossings
-from models.rail.wheelset import CHOSEN
+from models.rail.wheelset import CHOSEN_WHEELSET
 from models.sensors.rotations import integrate
-from models.systems.handling.run import principal, run
+from models.systems.handling.run import principal_series, run
 from models.systems.handling.scene import HandlingScene, build
 from models.systems.hub_forces.run import run as run_on_hubs
 from models.systems.hub_forces.scene import build as build_hubs
@@ -28,7 +28,7 @@ from validation.braking.braked_trucks import braking_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 from validation.hard_cases.rolling import STEP, built_wheelset
 
-HANDLED: dict[str, Word] = {"reference": "refused"}
+HANDLING_OUTCOMES: dict[str, Word] = {"reference": "refused"}
 """Handling has two implementations."""
 
 
@@ -37,8 +37,8 @@ def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callabl
     and yaw (m, rad) from those with a quarter of the step."""
 
     def error(implementation: str, folder: Path) -> float:
-        wheelset = built_wheelset(implementation, CHOSEN.changed(**changed), speed)
-        start = wheelset.displaced(5e-3)
+        wheelset = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
+        start = wheelset.displaced_state(5e-3)
         start[3] = yaw
         ends = [wheelset.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
         return float(np.abs(ends[1] - ends[0])[[0, 3]].max())
@@ -96,8 +96,8 @@ def driven_over_waves(implementation: str, folder: Path) -> float:
         raise InputError("", "engine", implementation, "handling is marched by engines")
     told = run(car(speed=1000.0, rough=True), implementation, error=True)
     name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
-    fine = principal(run(car(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
-    off = principal(told.detail).channels[name] - fine
+    fine = principal_series(run(car(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
+    off = principal_series(told.detail).channels[name] - fine
     return float(np.sqrt(np.mean(off**2))) / estimate.error if estimate.warned else np.inf
 
 
@@ -111,14 +111,14 @@ def crossings(implementation: str, folder: Path) -> float:
 def far_seeds(implementation: str, folder: Path) -> float:
     """Number of noise seeds near 2^63 and at the end of the range that give the same stream as another seed."""
     seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
-    return float(len(seeds) - len({float(normal(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
+    return float(len(seeds) - len({float(normal_samples(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
 
 
 def line_through_a_low_pass(implementation: str, folder: Path) -> float:
     """Case: a straight line of 2 s through the slowest low-pass that is allowed. Error: largest change, relative to the
     line's rise."""
     line = np.linspace(0.0, 1.0, 2001)[:, None]
-    return float(np.abs(smoothed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
+    return float(np.abs(low_passed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
 
 
 def slow_naive(folder: Path) -> str:
@@ -130,9 +130,9 @@ def slow_naive(folder: Path) -> str:
     return f"a line from 0 to 1 comes out with an error of {np.abs(filtered - line).max():.2g}"
 
 
-LINE = np.arange(5.0)[:, None]
-SPUN = np.tile([0.0, 0.0, 400.0], (50, 1)) + np.sin(np.arange(50.0))[:, None]
-NOBODY = np.array([1.0, 0.0, 0.0, 0.0])
+STRAIGHT_LINE = np.arange(5.0)[:, None]
+SPINNING_RATES = np.tile([0.0, 0.0, 400.0], (50, 1)) + np.sin(np.arange(50.0))[:, None]
+NO_ROTATION = np.array([1.0, 0.0, 0.0, 0.0])
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 CASES = (
@@ -165,7 +165,7 @@ CASES = (
         0.0,
         "exact",
         handled(brake=[[0.0, 0.0], [0.05, 1e5]]),
-        HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised"),
+        HANDLING_OUTCOMES | dict.fromkeys(("exudyn", "mujoco"), "raised"),
     ),
     Case(
         "driver who steers within 1 ms",
@@ -175,7 +175,7 @@ CASES = (
         0.0,
         "exact",
         handled(steer=[[0.001 * i, 0.02 * (i % 2)] for i in range(1, 200)]),
-        HANDLED | dict.fromkeys(("exudyn", "mujoco"), "raised"),
+        HANDLING_OUTCOMES | dict.fromkeys(("exudyn", "mujoco"), "raised"),
     ),
     Case(
         "road at 300 m/s",
@@ -185,7 +185,7 @@ CASES = (
         1e-4,
         "error of the step",
         handled(speed=300.0, rough=True),
-        HANDLED,
+        HANDLING_OUTCOMES,
     ),
     Case(
         "rough road at 1000 m/s",
@@ -195,7 +195,7 @@ CASES = (
         3.0,
         "an estimate by longer steps may be so wrong",
         driven_over_waves,
-        HANDLED,
+        HANDLING_OUTCOMES,
     ),
     Case(
         "hub forces of a road in steps of 20 ms",
@@ -248,27 +248,35 @@ CASES = (
             (
                 "low-pass slower than its record",
                 "what is beyond the ends is all that is left",
-                lambda: smoothed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth"),
+                lambda: low_passed(np.linspace(0.0, 1.0, 2001)[:, None], 1e-3, 0.01, "", "bandwidth"),
             ),
             (
                 "body that turns 4 rad from sample to sample",
                 "nobody can tell the way it went",
-                lambda: integrate(SPUN, 1e-2, NOBODY),
+                lambda: integrate(SPINNING_RATES, 1e-2, NO_ROTATION),
             ),
             (
                 "body that turns from an orientation of length 2",
                 "its matrix would be four times a rotation",
-                lambda: integrate(0.1 * SPUN, 1e-2, 2.0 * NOBODY),
+                lambda: integrate(0.1 * SPINNING_RATES, 1e-2, 2.0 * NO_ROTATION),
             ),
-            ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal(-1, 0, 1, 1)),
-            ("seed of 1.7", "the stream of 1 would answer", lambda: normal(1.7, 0, 1, 1)),  # type: ignore[arg-type]
+            ("seed of -1", "the stream of 2^64 - 1 would answer", lambda: normal_samples(-1, 0, 1, 1)),
+            ("seed of 1.7", "the stream of 1 would answer", lambda: normal_samples(1.7, 0, 1, 1)),  # type: ignore[arg-type]
             (
                 "level that is no number",
                 "all counts behind it would shift",
-                lambda: level_crossings(LINE[:, 0], np.array([0.5, np.nan, 2.5])),
+                lambda: level_crossings(STRAIGHT_LINE[:, 0], np.array([0.5, np.nan, 2.5])),
             ),
-            ("samples with a period of -0.1 s", "time would run backwards", lambda: sampled(LINE, -0.1, "linear")),
-            ("three samples, smooth", "a cubic needs four", lambda: sampled(LINE[:3], 0.1, "smooth")),
+            (
+                "samples with a period of -0.1 s",
+                "time would run backwards",
+                lambda: signal_from_samples(STRAIGHT_LINE, -0.1, "linear"),
+            ),
+            (
+                "three samples, smooth",
+                "a cubic needs four",
+                lambda: signal_from_samples(STRAIGHT_LINE[:3], 0.1, "smooth"),
+            ),
         )
     ),
 )

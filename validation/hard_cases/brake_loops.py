@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels, torques
+from models.brake.brake import Brake, of_wheels, torques_of_pressures
 from validation.hard_cases.case import Case
 
 LOOPED = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
@@ -17,7 +17,7 @@ def ways(implementation: str, folder: Path) -> float:
     levels = []
     for parts in (1, 7, 50):
         between = np.linspace(turns[:-1], turns[1:], parts, endpoint=False, axis=1).ravel()
-        levels.append(torques(np.append(between, turns[-1]), LOOPED)[::parts])
+        levels.append(torques_of_pressures(np.append(between, turns[-1]), LOOPED)[::parts])
     return float(max(np.abs(walk - levels[0]).max() for walk in levels))
 
 
@@ -27,7 +27,7 @@ def loops(implementation: str, folder: Path) -> float:
     worst = 0.0
     for low, high in np.sort(np.random.default_rng(3).uniform(0.0, 6.0, (20, 2)), axis=1):
         once = np.concatenate((np.linspace(low, high, 1001), np.linspace(high, low, 1001)))
-        levels = torques(np.concatenate((once, once)), LOOPED)
+        levels = torques_of_pressures(np.concatenate((once, once)), LOOPED)
         area = -float(np.trapezoid(levels[once.size :], once))
         worst = max(worst, -area, -float(levels.min()))
     return worst

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from models.brake.brake import Brake
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.plane_vehicle import PAPER_TRUCK, plane_of_truck
 from models.brake.quarter import braked
 from models.brake.surfaces import UNIFORM_ROAD, Stretch, check_way, road
 from models.core.errors import InputError
-from models.tyre.tyre_table import stacked
+from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
 from validation.braking.braked_wheels import DRY, bent_friction
@@ -103,7 +103,7 @@ CASES = (
         "",
         1e-9,
         "asked for",
-        wheels.locked,
+        wheels.locked_wheel_error,
     ),
     Case(
         "friction changes under a locked wheel",
@@ -112,7 +112,7 @@ CASES = (
         "",
         1e-4,
         "the step of the change takes its share of the way",
-        wheels.changing,
+        wheels.changing_friction_error,
     ),
     Case(
         "friction from 1e-6 to 1.5, locked",
@@ -121,7 +121,7 @@ CASES = (
         "",
         1e-6,
         "rounding of the speed",
-        wheels.frictions,
+        wheels.friction_range_error,
     ),
     Case(
         "standstill under brakes",
@@ -132,7 +132,7 @@ CASES = (
         "exact",
         wheels.at_rest,
     ),
-    Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards),
+    Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards_spin_error),
     Case(
         "brake lets go on a step's end",
         "locked until then, by an explicit state",
@@ -140,7 +140,7 @@ CASES = (
         "",
         1e-6,
         "60 time constants once it grips",
-        wheels.released,
+        wheels.released_brake_error,
     ),
     Case(
         "truck sliding sideways, locked",
@@ -176,7 +176,7 @@ CASES = (
         "m, rad",
         1e-12,
         "rounding",
-        trucks.mirrored,
+        trucks.mirrored_truck_error,
     ),
     Case(
         "train that jackknifes, locked",
@@ -185,7 +185,7 @@ CASES = (
         "",
         1e-12,
         "rounding",
-        trucks.jackknifed,
+        trucks.jackknifed_train_error,
     ),
     Case(
         "tyres that lag, at standstill",
@@ -230,7 +230,7 @@ CASES = (
         "m/s, rad/s",
         0.0,
         "exact",
-        trucks.rests(run={"duration": 10.0}),
+        trucks.rest_error_of_scene(run={"duration": 10.0}),
     ),
     Case(
         "pressure below push-out",
@@ -248,7 +248,7 @@ CASES = (
         "m/s, rad/s",
         0.0,
         "exact",
-        trucks.rests(**trucks.AT_THE_EDGE_OF_LOCKING),
+        trucks.rest_error_of_scene(**trucks.AT_THE_EDGE_OF_LOCKING),
     ),
     Case(
         "one wheel of four lifted",
@@ -262,7 +262,7 @@ CASES = (
     ),
     fails("truck that rolls over", "both wheels of a side bear nothing", trucks.turned_over),
     fails("299 bar of a supply of 6", "more than there is", trucks.nonsense_answers(6.0, pressures=np.full(4, 299.0))),
-    fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting),
+    fails("truck that lifts its rear wheels", "the plane has no lift-off", trucks.lifting_truck_error),
     fails(
         "controller answers not a number",
         "would spread to every state",
@@ -276,7 +276,7 @@ CASES = (
             (
                 "torque that drives the wheel",
                 lambda: braked(
-                    wheels.QUARTER, stacked([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
+                    wheels.QUARTER, stacked_tables([DRY]), UNIFORM_ROAD, np.full(3, -1.0), wheels.STEP, wheels.SPEED
                 ),
             ),
             ("table that ends before it locks", lambda: bent_friction((0.0, 0.0), (0.9, 0.8))),
@@ -286,10 +286,12 @@ CASES = (
                 lambda: check_way(road([Stretch(0.0, 0, 0), Stretch(1.0, 1, 1), Stretch(1.01, 0, 0)]), 0.1),
             ),
             ("brake that lets go too early", slippery_brake),
-            ("vehicle lighter than its wheels", lambda: truck(PAPER.model_copy(update={"mass": 100.0}))),
+            ("vehicle lighter than its wheels", lambda: plane_of_truck(PAPER_TRUCK.model_copy(update={"mass": 100.0}))),
             (
                 "roll shares that do not add up",
-                lambda: truck(PAPER.model_copy(update={"front": PAPER.front.model_copy(update={"roll_share": 0.5})})),
+                lambda: plane_of_truck(
+                    PAPER_TRUCK.model_copy(update={"front": PAPER_TRUCK.front.model_copy(update={"roll_share": 0.5})})
+                ),
             ),
         )
     ),

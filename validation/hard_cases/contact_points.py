@@ -10,7 +10,7 @@ from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.effects.contact_points import contact_points
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import IMPLICIT, driven_by_forces, largest_magnitude, run, vehicle
+from validation.hard_cases.setups import IMPLICIT_INTEGRATORS, driven_by_forces, largest_magnitude, run, vehicle
 
 STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 LOAD = 1000.0
@@ -33,7 +33,7 @@ def step_answer(engine: str, folder: Path) -> float:
         if engine == "exudyn":  # its implicit integrators refuse held samples
             path = run(engine, assembly, min(step, 2e-3), 0.1)
         else:
-            path = run(engine, assembly, step, 0.1, IMPLICIT[engine])
+            path = run(engine, assembly, step, 0.1, IMPLICIT_INTEGRATORS[engine])
         since = np.maximum(path.times - 2e-2, 0.0)
         truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
         worst = max(worst, largest_magnitude(_compressions(assembly, path)[:, 0] - truth) / (LOAD / p.k1))
@@ -58,7 +58,7 @@ def step_answer_naive(folder: Path) -> str:
 
 def linear_load(engine: str, folder: Path) -> float:
     """Case: a load ramp of 1 kN in 20 ms. Error: difference from the closed form, in which the compression lags."""
-    return max(_ramp_error(engine, step, IMPLICIT[engine]) for step in (1e-3, 5e-3, 2e-2))
+    return max(_ramp_error(engine, step, IMPLICIT_INTEGRATORS[engine]) for step in (1e-3, 5e-3, 2e-2))
 
 
 def _ramp_error(engine: str, step: float, integrator: str) -> float:
@@ -66,10 +66,12 @@ def _ramp_error(engine: str, step: float, integrator: str) -> float:
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
     assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
     path = run(engine, assembly, step, 0.1, integrator)
-    return largest_magnitude(_compressions(assembly, path)[:, 0] - _ramp(path.times, p.k1, p.d1)) / (LOAD / p.k1)
+    return largest_magnitude(_compressions(assembly, path)[:, 0] - _compression_under_ramp(path.times, p.k1, p.d1)) / (
+        LOAD / p.k1
+    )
 
 
-def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
+def _compression_under_ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
     """Compression (n,) in m under a load that rises to LOAD in 20 ms, as the difference of two ramps."""
     lag = damping / stiffness
 

@@ -16,7 +16,7 @@ PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 """Of the held samples (s), their number, and the step (s): 35 times the decay time of the fastest pole per sample."""
 
 
-def _base(values: np.ndarray) -> Assembly:
+def _base_assembly(values: np.ndarray) -> Assembly:
     """The linearised vehicle under its weight, with these errors (n, 2) in N added to its force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, PERIOD)
@@ -26,19 +26,19 @@ def _base(values: np.ndarray) -> Assembly:
 def held_noise(engine: str, folder: Path) -> float:
     """Case: an error of 1 N in each single sample is run through the engine. Error: relative difference of the summed
     squares of the responses from the covariance recursion."""
-    quiet = setups.run(engine, _base(np.zeros((SAMPLES, 2))), STEP, PERIOD * SAMPLES).states[-1]
+    quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, PERIOD * SAMPLES).states[-1]
     responses = []
     for sample in range(SAMPLES):
         for wheel in range(2):
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
-            responses.append(setups.run(engine, _base(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
-    covariance, expected = np.array(responses).T @ np.array(responses), _recursion()
+            responses.append(setups.run(engine, _base_assembly(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
+    covariance, expected = np.array(responses).T @ np.array(responses), _covariance_recursion()
     return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
 
 
-def _recursion() -> np.ndarray:
-    assembly = _base(np.zeros((SAMPLES, 2)))
+def _covariance_recursion() -> np.ndarray:
+    assembly = _base_assembly(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(PERIOD / STEP), SAMPLES), 1.0)[-1]
 
@@ -49,7 +49,7 @@ def van_loan_naive(folder: Path) -> str:
 
     from models.engines.stability import first_order, linearised
 
-    base = _base(np.zeros((SAMPLES, 2)))
+    base = _base_assembly(np.zeros((SAMPLES, 2)))
     p, linear = base.parameters, linearised(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2

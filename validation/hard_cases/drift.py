@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.result import Result
 from models.drift.growth import drift_off_time
-from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors, figures_of_run, verdict
+from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors_of_run, figures_of_run, verdict_on_run
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
@@ -19,7 +19,7 @@ from validation.hard_cases.case import Case
 from validation.hard_cases.setups import REFUSED, largest_magnitude
 
 DURATION = 8.0
-TILT = 0.1
+WRONG_PITCH_RATE = 0.1
 """Pitch rate (rad/s) by which a drifted run starts wrong: at a growth of 0.4 1/s it has turned over in 8 s."""
 SOFT_STIFFNESS = 50.0
 """N m/rad: 82 hold on this road."""
@@ -43,47 +43,49 @@ def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, t
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
-def figures(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
+def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
     """Figures of a run that need no true run, and its errors relative to the true run."""
-    return figures_of_run(run, scene.vehicle_parameters()), errors(run, truth)
+    return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
 
 
 def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
     """Words of the verdicts on a run, with and without knowledge of the true run."""
-    scores, wrong = figures(simulate(scene, engine), truth, scene)
+    scores, wrong = figures_and_errors(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
-    return verdict(scores, wrong, scene.effects, Limits()).word, known.word
+    return verdict_on_run(scores, wrong, scene.effects, Limits()).word, known.word
 
 
 def tumbled(engine: str, folder: Path) -> float:
     """Case: a free run that has turned over must be rejected."""
-    judged = verdict_words(engine, follow(folder, measured(), tilt=TILT), measured())
+    judged = verdict_words(engine, follow(folder, measured(), tilt=WRONG_PITCH_RATE), measured())
     return float(judged != ("rejected", "rejected"))
 
 
 def tumbled_naive(folder: Path) -> str:
     """Without the guard: damage of a tumbled run from its vertical forces alone."""
-    scene = follow(folder, measured(), tilt=TILT)
-    scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    scene = follow(folder, measured(), tilt=WRONG_PITCH_RATE)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(), scene)
     return (
         f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
         f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times"
     )
 
 
-SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
-FIRM = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
+SOFT_SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
+FIRM_SPRING = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
 def soft_spring(engine: str, folder: Path) -> float:
     """Case: a holding spring that is too soft."""
-    return float(verdict_words(engine, follow(folder, measured(), SPRING, TILT), measured())[0] != "rejected")
+    return float(
+        verdict_words(engine, follow(folder, measured(), SOFT_SPRING, WRONG_PITCH_RATE), measured())[0] != "rejected"
+    )
 
 
 def soft_naive(folder: Path) -> str:
     """Without the guard: figures of the run itself, which do not show that the spring is too soft."""
-    scene = follow(folder, measured(), SPRING, TILT)
-    scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    scene = follow(folder, measured(), SOFT_SPRING, WRONG_PITCH_RATE)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
         f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong"
@@ -93,14 +95,14 @@ def soft_naive(folder: Path) -> str:
 def graded(engine: str, folder: Path) -> float:
     """Case: a holding spring on a grade, which gives wrong results. Error: 0 if it is rejected, and not accepted
     without the true run either; else 1."""
-    judged = verdict_words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
+    judged = verdict_words(engine, follow(folder, measured(0.1), FIRM_SPRING), measured(0.1))
     return float(judged != ("rejected", "stabilise"))
 
 
 def graded_naive(folder: Path) -> str:
     """Figures of the run itself on a graded road."""
-    scene = follow(folder, measured(0.1), FIRM)
-    scores, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
+    scene = follow(folder, measured(0.1), FIRM_SPRING)
+    scores, wrong = figures_and_errors(simulate(scene, "reference"), measured(0.1), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
         f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage"

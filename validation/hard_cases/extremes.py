@@ -8,9 +8,9 @@ import numpy as np
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked, vehicle
+from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked_run, vehicle
 
-IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
+IMPLICIT_INTEGRATORS = {**setups.IMPLICIT_INTEGRATORS, "reference": "LSODA"}
 """Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
 TOLERANCE = 1e-6
 """Of the adaptive solvers; at a tenth of it LSODA, too, chases that rounding, in 140,000 steps instead of 300."""
@@ -29,17 +29,17 @@ def _distance_from_equilibrium(engine: str, base: Assembly, integrator: str = ""
 
 def undamped(engine: str, folder: Path) -> float:
     """Case: a vehicle without any dampers for 1 s. Error: difference from the matrix exponential."""
-    return _ringing(engine)
+    return _ringing_error(engine)
 
 
-def _ringing(engine: str, integrator: str = "") -> float:
-    base, truth = _undamped()
+def _ringing_error(engine: str, integrator: str = "") -> float:
+    base, truth = _undamped_vehicle()
     return largest_magnitude(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest_magnitude(
         truth - base.initial
     )
 
 
-def _undamped() -> tuple[Assembly, np.ndarray]:
+def _undamped_vehicle() -> tuple[Assembly, np.ndarray]:
     """The vehicle without dampers, displaced from equilibrium, and its exact states over 1 s."""
     base = _raised_vehicle(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
     return base, exact_states(base, 1e-3, 1000)
@@ -47,8 +47,8 @@ def _undamped() -> tuple[Assembly, np.ndarray]:
 
 def undamped_unchecked_euler(folder: Path) -> str:
     """Without the guard: explicit Euler with the check bypassed, by which every mode grows."""
-    base, truth = _undamped()
-    states = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
+    base, truth = _undamped_vehicle()
+    states = unchecked_run("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
         f"Exudyn's explicit Euler past the check: {largest_magnitude(states - base.initial):.2g} where the truth "
         f"stays below {largest_magnitude(truth - base.initial):.2g}, finite and unwarned"
@@ -57,7 +57,7 @@ def undamped_unchecked_euler(folder: Path) -> str:
 
 def undamped_euler(engine: str, folder: Path) -> float:
     """Case: undamped oscillation by an explicit first-order method, which makes it grow."""
-    return _ringing(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
+    return _ringing_error(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
 def light_wheel(engine: str, folder: Path) -> float:
@@ -67,7 +67,7 @@ def light_wheel(engine: str, folder: Path) -> float:
 
 def light_wheel_implicit(engine: str, folder: Path) -> float:
     """Error of the light wheel by an implicit integrator."""
-    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
+    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT_INTEGRATORS[engine])
 
 
 def stiff_tyre(engine: str, folder: Path) -> float:
@@ -77,13 +77,13 @@ def stiff_tyre(engine: str, folder: Path) -> float:
 
 def stiff_tyre_implicit(engine: str, folder: Path) -> float:
     """Error on the stiff tyre by an implicit integrator."""
-    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
+    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT_INTEGRATORS[engine])
 
 
 def stiff_tyre_naive(folder: Path) -> str:
     """Without the guard: two steps with the check bypassed."""
     base = vehicle(k1=1e9, k2=1e9)
-    end = unchecked("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
+    end = unchecked_run("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
     return f"MuJoCo past the check: {largest_magnitude(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
 
 

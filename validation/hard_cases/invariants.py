@@ -141,7 +141,7 @@ def free_heave(engine: str, folder: Path) -> float:
     return worst / size
 
 
-def _spun(geometry: str) -> Assembly:
+def _spinning_assembly(geometry: str) -> Assembly:
     """The twin under its own weight, rotating at 6 rad/s."""
     base = vehicle("asymmetric_twin", geometry)
     start = base.initial.copy()
@@ -150,15 +150,15 @@ def _spun(geometry: str) -> Assembly:
 
 
 @cache
-def _tumbled() -> np.ndarray:
-    return tight_solution(_spun("exact"), 2.5e-4, 1.0).states
+def _tumbled_states() -> np.ndarray:
+    return tight_solution(_spinning_assembly("exact"), 2.5e-4, 1.0).states
 
 
 def tumbling(engine: str, folder: Path) -> float:
     """Case: a vehicle that rotates at 6 rad/s turns over, for 1 s in steps of 0.25 ms. Error: difference from a
     solution of order 8."""
-    states = run(engine, _spun("exact"), 2.5e-4, 1.0).states
-    truth = _tumbled()
+    states = run(engine, _spinning_assembly("exact"), 2.5e-4, 1.0).states
+    truth = _tumbled_states()
     if truth[:, 3].max() < np.pi / 2:
         return np.inf
     return largest_magnitude(states - truth)
@@ -166,18 +166,18 @@ def tumbling(engine: str, folder: Path) -> float:
 
 def tumbling_naive(folder: Path) -> str:
     """Without the remedy: the same scene in linear geometry."""
-    ends = [run("reference", _spun(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
+    ends = [run("reference", _spinning_assembly(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
     return f"exact geometry turns to {ends[0]:.2f} rad, the linear one says {ends[1]:.2f} rad"
 
 
-DRIVE = 8.0
+DRIVE_DURATION = 8.0
 
 
 @cache
-def _measured() -> Sampled:
+def _measured_forces() -> Sampled:
     """Wheel forces (N) of a drive on the study road, sampled at 1 kHz."""
     scene = build_scene(
-        {"title": "", "run": {"duration": DRIVE}, "effects": {"road": {"source": "study", "speed": 20.0}}}
+        {"title": "", "run": {"duration": DRIVE_DURATION}, "effects": {"road": {"source": "study", "speed": 20.0}}}
     )
     result: Result = simulate(scene, "reference")
     return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
@@ -189,7 +189,9 @@ def growth(engine: str, mode: Mode) -> float:
     start = base.initial.copy()
     start[3] += 1e-6
     ends = [
-        run(engine, driven_by_forces(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
+        run(engine, driven_by_forces(replace(base, initial=y), _measured_forces(), mode), 1e-3, DRIVE_DURATION).states[
+            -1, 3
+        ]
         for y in (base.initial, start)
     ]
     return abs(ends[1] - ends[0]) / 1e-6
@@ -202,7 +204,7 @@ def body_frame(engine: str, folder: Path) -> float:
 
 def body_frame_naive(folder: Path) -> str:
     """Without the remedy: the body-fixed forces are applied as vertical ones."""
-    return f"vertical forces let the error grow {growth('reference', 'force'):.0f}-fold in {DRIVE:.0f} s"
+    return f"vertical forces let the error grow {growth('reference', 'force'):.0f}-fold in {DRIVE_DURATION:.0f} s"
 
 
 CASES = (

@@ -9,14 +9,14 @@ from filterpy.common import van_loan_discretization
 from filterpy.kalman import ExtendedKalmanFilter
 from scipy.linalg import expm
 
-from models.core.noise import PITCH_SENSOR, normal
+from models.core.noise import PITCH_SENSOR, normal_samples
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE, Measurement, PitchStep, estimate
+from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE_STATES, Measurement, PitchStep, estimate
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
-from validation.drift.kalman_runs import relative
+from validation.drift.kalman_runs import relative_state_matrices
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, static_forces, vehicle
 
@@ -37,7 +37,7 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
     base = vehicle()
     forces = static_forces(base, count, PERIOD, held=False).values
     write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
-    seen = base.initial[3] + ANGLE * normal(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    seen = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     seen[lost] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
     p, start = base.parameters, base.initial.copy()
@@ -93,7 +93,7 @@ def certain_start(engine: str, folder: Path) -> float:
             update={"run": assembly.scene.run.model_copy(update={"duration": count * PERIOD})}
         ),
     )
-    seen = base.initial[3] + exact * normal(7, 0, count + 1, 1, source=PITCH_SENSOR)
+    seen = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
     estimated = estimate(assembly, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
     P = estimated.errors()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
@@ -112,7 +112,7 @@ def empty_column(engine: str, folder: Path) -> float:
 def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matrices A (6, 6) and B (6, 2) of the relative states, and their exact response (6, 2) to forces held over
     SLOW_PERIOD."""
-    a, b = relative(vehicle(geometry="linear").without_tyres())
+    a, b = relative_state_matrices(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
     return a, b, expm(block * SLOW_PERIOD)[:6, 6:]
@@ -123,7 +123,7 @@ def stiff_process_noise(engine: str, folder: Path) -> float:
     base = vehicle(geometry="linear")
     forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
     step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)
-    early = step.advance(np.append(RELATIVE @ base.initial, 0.0), 0)[2][:6]
+    early = step.advance(np.append(RELATIVE_STATES @ base.initial, 0.0), 0)[2][:6]
     wanted = _exact_response()[2]
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
 

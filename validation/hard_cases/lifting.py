@@ -24,19 +24,19 @@ from models.road.iso8608 import iso8608_road
 from models.road.polyline import PolylineProfile
 from models.road.signal import RoadUnderWheels
 from models.systems.hub_forces.measurement import true_run, two_tracks
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.bounces import Bounces, energy
+from validation.common.bounces import Bounces, bounce_energy
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 TWIN = "asymmetric_twin"
-STEP, LASTING = 1e-4, 0.6
+STEP, LONGEST_DURATION = 1e-4, 0.6
 """s: of most runs, and how long they last: several landings of both wheels."""
-FALLING = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
+FALLING_STATE = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
 """Both wheels in the air, one higher."""
 Error = Callable[[str, Path], float]
 
@@ -46,12 +46,12 @@ def vehicle(start: np.ndarray, geometry: str, override: dict[str, float]) -> Ass
     return setups.vehicle(TWIN, geometry, start, {"lift_off": {}}, **override)
 
 
-def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) -> Error:
+def exactly(step: float = STEP, start: np.ndarray = FALLING_STATE, **override: float) -> Error:
     """Case: a bouncing vehicle. Error: largest difference (m, rad, m/s, rad/s) from the exact path."""
 
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(start, "linear", override)
-        states = setups.run(engine, assembly, step, LASTING).states
+        states = setups.run(engine, assembly, step, LONGEST_DURATION).states
         every = max(1, round(step / STEP))
         exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(states) - 1))
         return setups.largest_magnitude(states - exact[::every])
@@ -64,9 +64,9 @@ def gained(**override: float) -> Error:
     kinetic energy."""
 
     def error(engine: str, folder: Path) -> float:
-        assembly = vehicle(FALLING, "exact", override)
-        states = setups.run(engine, assembly, STEP, LASTING).states
-        energies = energy(assembly, states)
+        assembly = vehicle(FALLING_STATE, "exact", override)
+        states = setups.run(engine, assembly, STEP, LONGEST_DURATION).states
+        energies = bounce_energy(assembly, states)
         return float(
             (energies - np.minimum.accumulate(energies)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2)
         )
@@ -89,7 +89,7 @@ def thrown_up(engine: str, folder: Path) -> float:
 
 def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
     """The half car without symmetry on the road of a scene."""
-    return assemble(
+    return assembly_of_scene(
         build_scene(
             {
                 "title": "hard case",
@@ -109,11 +109,11 @@ def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) 
         setups.run(engine, assembly, step, duration).states,
         setups.tight_solution(assembly, step, duration).states,
     )
-    air = exact[:, 0] < _heights(assembly.input, step, len(exact))
+    air = exact[:, 0] < _road_heights(assembly.input, step, len(exact))
     return setups.largest_magnitude(states - exact) if air.any() else np.inf
 
 
-def _heights(road: Signal | None, step: float, count: int) -> np.ndarray:
+def _road_heights(road: Signal | None, step: float, count: int) -> np.ndarray:
     """Road heights (m, down) under the front wheel."""
     return np.zeros(count) if road is None else road.sample(0.0, step, count)[:, 0]
 
@@ -171,8 +171,8 @@ def above_a_cut(engine: str, folder: Path) -> float:
 
 def linear_naive(folder: Path) -> str:
     """Without the remedy: the paper's linear tyre in the same fall."""
-    assembly = setups.vehicle(TWIN, "linear", FALLING)
-    states, p = setups.run("reference", assembly, STEP, LASTING).states, assembly.parameters
+    assembly = setups.vehicle(TWIN, "linear", FALLING_STATE)
+    states, p = setups.run("reference", assembly, STEP, LONGEST_DURATION).states, assembly.parameters
     return f"the linear tyre pulls with up to {-(p.k1 * states[:, 0] + p.d1 * states[:, 4]).min():.0f} N"
 
 
@@ -183,7 +183,7 @@ def hard_naive(folder: Path) -> str:
     return f"stable, finite, a wheel's velocity off by {off:.2g} m/s"
 
 
-THROWN = "a corner of the force within a step costs its square"
+THROWN_REASON = "a corner of the force within a step costs its square"
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
@@ -203,7 +203,16 @@ EXACT: tuple[tuple[str, str, float, Error], ...] = (
 )
 CASES = (
     *(
-        Case(name, hard, PATH, STATES, tolerance, THROWN, error, naive=linear_naive if error is EXACT[0][3] else None)
+        Case(
+            name,
+            hard,
+            PATH,
+            STATES,
+            tolerance,
+            THROWN_REASON,
+            error,
+            naive=linear_naive if error is EXACT[0][3] else None,
+        )
         for name, hard, tolerance, error in EXACT
     ),
     Case(
@@ -212,7 +221,7 @@ CASES = (
         "gains no energy",
         "of the motion",
         1e-4,
-        THROWN,
+        THROWN_REASON,
         gained(**UNDAMPED),
     ),
     Case(
@@ -251,7 +260,7 @@ CASES = (
         "tight tolerance",
         STATES,
         1e-4,
-        THROWN,
+        THROWN_REASON,
         coarse_road,
         against="native",
     ),

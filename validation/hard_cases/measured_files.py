@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.measured.formats.mdf4 import opened as mdf4_opened
-from models.measured.formats.tdms import Bounded, opened
+from models.measured.formats.mdf4 import opened_mdf as mdf4_opened
+from models.measured.formats.tdms import BoundedFile, opened_tdms
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
 from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, raw
@@ -34,8 +34,8 @@ def invalid_samples(folder: Path) -> str:
 
 def cut_segment(folder: Path) -> str:
     """What npTDMS reads from a file that was cut off."""
-    with Bounded(tdms.cut_by(100)(folder)) as file:
-        lengths = [len(channel) for group in opened(folder, file).groups() for channel in group.channels()]
+    with BoundedFile(tdms.cut_by(100)(folder)) as file:
+        lengths = [len(channel) for group in opened_tdms(folder, file).groups() for channel in group.channels()]
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
 
 

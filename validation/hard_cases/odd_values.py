@@ -19,10 +19,10 @@ from models.contact.standard_profiles import built_in
 from models.contact.theories import ExactOnEllipse, Fastsim
 from models.core.result import Result, load
 from models.drift.growth import drift_off_time
-from models.drift.point_mass import discrete
-from models.ensemble.statistics import deviation, quantile
+from models.drift.point_mass import euler_covariance
+from models.ensemble.statistics import deviation_with_error, quantile_with_interval
 from models.fatigue.damage import pseudo_damage
-from models.ride.covariance import lyapunov
+from models.ride.covariance import lyapunov_solution
 from models.ride.measures import dynamic_load_factor, share_beyond
 from models.ride.nonlinear_copies import copies_in_time
 from models.road.excitation import Excitation
@@ -46,16 +46,16 @@ def far_below(implementation: str, folder: Path) -> float:
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
-    ways = [_copies(corner).deviation for corner in (1e-6, 0.1)]
+    ways = [_run_copies(corner).deviation for corner in (1e-6, 0.1)]
     return float(np.abs(ways[0] / ways[1] - 1.0).max())
 
 
-def _copies(corner: float) -> Any:
-    vehicle, road = _bent(corner)
+def _run_copies(corner: float) -> Any:
+    vehicle, road = _vehicle_and_road(corner)
     return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest=2e-3)
 
 
-def _bent(corner: float) -> tuple[SpatialVehicle, Excitation]:
+def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
     scene = build(
         {
             "title": "hard",
@@ -192,19 +192,19 @@ CASES = (
             ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
             ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
             ("limit below 0", "a share of time above 1", lambda: share_beyond(1.0, -1.0)),
-            ("deviation of two values", "its error would be 0", lambda: deviation(np.array([1.0, 2.0]))),
+            ("deviation of two values", "its error would be 0", lambda: deviation_with_error(np.array([1.0, 2.0]))),
             (
                 "quantile of what is no number",
                 "would be sorted to the end",
-                lambda: quantile(np.array([1.0, np.nan]), 0.5),
+                lambda: quantile_with_interval(np.array([1.0, np.nan]), 0.5),
             ),
             (
                 "covariance of what grows",
                 "Lyapunov's equation has an answer, which is none",
-                lambda: lyapunov(-STABLE, np.eye(2)),
+                lambda: lyapunov_solution(-STABLE, np.eye(2)),
             ),
-            ("right side that is askew", "another one would be solved", lambda: lyapunov(STABLE, SKEW)),
-            ("point mass of nothing", "divided by", lambda: discrete(10, 1.0, 1e-3, 0.0)),
+            ("right side that is askew", "another one would be solved", lambda: lyapunov_solution(STABLE, SKEW)),
+            ("point mass of nothing", "divided by", lambda: euler_covariance(10, 1.0, 1e-3, 0.0)),
         )
     ),
 )

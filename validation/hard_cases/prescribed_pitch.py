@@ -15,10 +15,10 @@ from models.engines.mujoco import specification
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import (
-    CONSTRAINED,
+    CONSTRAINED_INTEGRATORS,
     driven_by_forces,
     largest_magnitude,
-    rms,
+    root_mean_square,
     run,
     settings,
     smooth_pitch,
@@ -45,10 +45,10 @@ def scene(period: float = PERIOD, noise: float = 0.0) -> Assembly:
     base = vehicle()
     samples = angle(period * np.arange(round(DURATION / period) + 1))
     samples = samples + noise * np.random.default_rng(5).standard_normal(len(samples))
-    return setups.guided(_settled(base), _weight(), smooth_pitch(samples, period))
+    return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, period))
 
 
-def _weight() -> Sampled:
+def _weight_forces() -> Sampled:
     return static_forces(vehicle(), 2, DURATION, held=False)
 
 
@@ -57,11 +57,11 @@ def _settled_state() -> np.ndarray:
     """State in which the fast suspension modes have decayed, so that only multipliers are compared."""
     base = vehicle()
     samples = angle(PERIOD * np.arange(-500, 2))
-    before = setups.guided(base, _weight(), smooth_pitch(samples, PERIOD))
+    before = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, PERIOD))
     return tight_solution(before, PERIOD, DURATION).states[-1]
 
 
-def _settled(base: Assembly) -> Assembly:
+def _settled_assembly(base: Assembly) -> Assembly:
     base.initial[:] = _settled_state()
     return base
 
@@ -87,19 +87,19 @@ def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
     """
     assert path.moment is not None
     every = (len(path.moment) - 1) // (len(exact_moment) - 1)
-    return rms((path.moment[::every] - exact_moment)[20:])
+    return root_mean_square((path.moment[::every] - exact_moment)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
     """Error of the enforced moment at 1 ms with the recommended settings."""
-    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine])
-    return moment_error(path, truth()) / rms(truth())
+    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine])
+    return moment_error(path, truth()) / root_mean_square(truth())
 
 
 def soft_naive(folder: Path) -> str:
     """Without the remedy: MuJoCo's own equality constraint, with its target set before each step."""
     errors = [_soft_error(step) for step in (1e-3, 5e-4)]
-    share = [error / rms(truth()) for error in errors]
+    share = [error / root_mean_square(truth()) for error in errors]
     return f"MuJoCo's equality constraint: moment off by {share[0]:.0%} of its rms at 1 ms, {share[1]:.0%} at 0.5 ms"
 
 
@@ -121,14 +121,14 @@ def _soft_error(step: float) -> float:
         mujoco.mj_step(model, data)
         moment[i] = data.qfrc_constraint[3]
     wanted = truth()[:-1]
-    return rms((moment[:: round(1e-3 / step)] - wanted)[20:])
+    return root_mean_square((moment[:: round(1e-3 / step)] - wanted)[20:])
 
 
 def undamped_multiplier(engine: str, folder: Path) -> float:
     """Case: generalised-alpha with spectral radius 1 in Exudyn. Other implementations eliminate the pitch and have no
     such setting."""
-    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine], spectral_radius=1.0)
-    return moment_error(path, truth()) / rms(truth())
+    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine], spectral_radius=1.0)
+    return moment_error(path, truth()) / root_mean_square(truth())
 
 
 class AsItComes(exudyn_engine.ExudynModel):
@@ -167,22 +167,22 @@ def undamped_multiplier_naive(folder: Path) -> str:
         assert path.moment is not None
         late = (path.moment - truth())[-100:]
         heave = largest_magnitude((path.states - solution().states)[-100:, :4])
-        parts.append(f"{name} by {rms(late):.0f} N m (states by {heave:.0e})")
-    return f"moment of {rms(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
+        parts.append(f"{name} by {root_mean_square(late):.0f} N m (states by {heave:.0e})")
+    return f"moment of {root_mean_square(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
 
 def noisy(engine: str, folder: Path) -> float:
     """Enforced moment caused by noise of 1e-6 rad on the samples, divided by its finite-difference value."""
-    return _noisy(engine, 1e-3)
+    return _noisy_moment(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
     """Enforced moment caused by noise of 1e-6 rad on samples every 0.125 ms, divided by its finite-difference value."""
-    return _noisy(engine, 1.25e-4)
+    return _noisy_moment(engine, 1.25e-4)
 
 
-def _noisy(engine: str, step: float) -> float:
-    path = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED[engine])
+def _noisy_moment(engine: str, step: float) -> float:
+    path = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED_INTEGRATORS[engine])
     return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
 
 
@@ -190,7 +190,7 @@ def noisy_naive(folder: Path) -> str:
     """Without the remedy: Exudyn's default on noisy samples that are interpolated linearly."""
     base = vehicle()
     samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
-    assembly = setups.guided(_settled(base), _weight(), Straight(samples, PERIOD))
+    assembly = setups.guided_vehicle(_settled_assembly(base), _weight_forces(), StraightLinePitch(samples, PERIOD))
     path = as_it_comes(assembly, 1e-3)
     expected = base.parameters.I * NOISE * np.sqrt(6) / PERIOD**2
     return (
@@ -200,7 +200,7 @@ def noisy_naive(folder: Path) -> str:
 
 
 @dataclass(frozen=True)
-class Straight:
+class StraightLinePitch:
     """Prescribed pitch that is interpolated linearly between samples: its rate jumps, and it has no second
     derivative."""
 
@@ -232,7 +232,9 @@ class Straight:
 
 def refined(engine: str, folder: Path) -> float:
     """Ratio of the moment's error at 0.5 ms to that at 1 ms, with data sampled every 1 ms."""
-    errors = [moment_error(run(engine, scene(), h, DURATION, CONSTRAINED[engine]), truth()) for h in (1e-3, 5e-4)]
+    errors = [
+        moment_error(run(engine, scene(), h, DURATION, CONSTRAINED_INTEGRATORS[engine]), truth()) for h in (1e-3, 5e-4)
+    ]
     return errors[1] / errors[0]
 
 
@@ -240,8 +242,8 @@ def refined_naive(folder: Path) -> str:
     """Without the remedy: Exudyn with noise-free samples that are interpolated linearly."""
     errors = []
     for step in (1e-3, 5e-4):
-        pitch = Straight(angle(PERIOD * np.arange(501)), PERIOD)
-        assembly = setups.guided(_settled(vehicle()), _weight(), pitch)
+        pitch = StraightLinePitch(angle(PERIOD * np.arange(501)), PERIOD)
+        assembly = setups.guided_vehicle(_settled_assembly(vehicle()), _weight_forces(), pitch)
         errors.append(moment_error(as_it_comes(assembly, step), truth()))
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"
 
@@ -249,7 +251,7 @@ def refined_naive(folder: Path) -> str:
 def explicit(engine: str, folder: Path) -> float:
     """Error of the enforced moment by the explicit fourth-order solver of each engine."""
     path = run(engine, scene(), 1e-3, DURATION)
-    return moment_error(path, truth()) / rms(truth())
+    return moment_error(path, truth()) / root_mean_square(truth())
 
 
 def explicit_naive(folder: Path) -> str:
@@ -268,18 +270,18 @@ def fed_back(engine: str, folder: Path) -> float:
     forces: Signal = static_forces(base, 2, DURATION, held=False)
     base.initial[3] += 0.05
     free = tight_solution(driven_by_forces(base, forces), 2.5e-4, DURATION).states
-    guided = setups.guided(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
+    guided = setups.guided_vehicle(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
     guided.initial[:] = free[0]
-    path = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED[engine])
+    path = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine])
     assert path.moment is not None and guided.input is not None
     inertia = base.parameters.I * guided.input.sample(0.0, 2.5e-4, len(path.times))[:, 4]
-    return rms(path.moment[40:]) / rms(inertia)
+    return root_mean_square(path.moment[40:]) / root_mean_square(inertia)
 
 
 def gap(engine: str, folder: Path) -> float:
     """Largest difference of the pitch from the prescribed one."""
     assembly = scene()
-    path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
+    path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine])
     assert assembly.input is not None
     return largest_magnitude(path.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 2])
 

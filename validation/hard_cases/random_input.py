@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.noise import BLOCK, FORCES, GYRO, ROAD, normal
-from models.drift.growth import SERIES, pitch_variance
+from models.core.noise import FORCES, GYRO, ROAD, SAMPLES_PER_BLOCK, normal_samples
+from models.drift.growth import SERIES_LIMIT, pitch_variance
 from models.engines.protocol import build
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.ride.road_path import RoadPath, road_path
 from models.road.excitation import Excitation
-from models.road.two_track import excitation, on_track, road_of_level
+from models.road.two_track import on_track, road_excitation, road_of_level
 from models.sensors.inertial_unit import (
     error_rotation,
     euler_mean_square,
@@ -26,7 +26,7 @@ from models.sensors.inertial_unit import (
     measured_attitude,
     random_walk,
 )
-from models.sensors.rotations import matrix
+from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
@@ -56,21 +56,35 @@ def asked_again(engine: str, folder: Path) -> float:
 def streams(implementation: str, folder: Path) -> float:
     """Largest correlation between any two noise streams, divided by the size that chance allows among so many pairs."""
     paths = [
-        normal(seed, path, BLOCK, 1, source=source)[:, 0]
+        normal_samples(seed, path, SAMPLES_PER_BLOCK, 1, source=source)[:, 0]
         for seed in (0, 1)
         for path in (0, 1)
         for source in (FORCES, GYRO, ROAD)
     ]
-    paths += [normal(0, 0, BLOCK, 1, first=BLOCK)[:, 0], *normal(5, 0, BLOCK, 2).T]
-    worst = max(abs(float(first @ two)) / BLOCK**0.5 for first, two in combinations(paths, 2))
+    paths += [
+        normal_samples(0, 0, SAMPLES_PER_BLOCK, 1, first=SAMPLES_PER_BLOCK)[:, 0],
+        *normal_samples(5, 0, SAMPLES_PER_BLOCK, 2).T,
+    ]
+    worst = max(abs(float(first @ two)) / SAMPLES_PER_BLOCK**0.5 for first, two in combinations(paths, 2))
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
 def pieces_of_stream(implementation: str, folder: Path) -> float:
     """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
     stream."""
-    whole, edges = normal(9, 4, 3 * BLOCK, 3), [0, 1, BLOCK - 1, BLOCK, BLOCK + 7, 2 * BLOCK + 1, 3 * BLOCK]
-    parts = [normal(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
+    whole, edges = (
+        normal_samples(9, 4, 3 * SAMPLES_PER_BLOCK, 3),
+        [
+            0,
+            1,
+            SAMPLES_PER_BLOCK - 1,
+            SAMPLES_PER_BLOCK,
+            SAMPLES_PER_BLOCK + 7,
+            2 * SAMPLES_PER_BLOCK + 1,
+            3 * SAMPLES_PER_BLOCK,
+        ],
+    )
+    parts = [normal_samples(9, 4, end - start, 3, first=start) for start, end in reversed(list(pairwise(edges)))]
     return float(np.abs(np.concatenate(parts[::-1]) - whole).max())
 
 
@@ -122,14 +136,14 @@ def attitude(implementation: str, folder: Path) -> float:
     start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
     attitudes = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
     true = measured_attitude(rates, 1.0 / RATE, np.zeros(3), start, range(1))[-1]
-    traces = np.trace(matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
+    traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
     wanted = mean_trace(random_walk(deviation[0], RATE), SAMPLES / RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
 def attitude_naive(folder: Path) -> str:
     """Without the remedy: norm of a quaternion that is integrated by explicit Euler."""
-    turns = WALK / RATE**0.5 * np.stack([normal(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
+    turns = WALK / RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
         f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
@@ -141,13 +155,13 @@ def no_growth(implementation: str, folder: Path) -> float:
     """Relative error of the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series,
     against 60 digits."""
     worst = 0.0
-    for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES, np.nextafter(SERIES, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
+    for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES_LIMIT, np.nextafter(SERIES_LIMIT, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
-        worst = max(worst, abs(variance / _law(Decimal(x)) - 1.0))
+        worst = max(worst, abs(variance / _exact_law(Decimal(x)) - 1.0))
     return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))
 
 
-def _law(x: Decimal) -> float:
+def _exact_law(x: Decimal) -> float:
     with localcontext() as context:
         context.prec = 60
         sinh = (x.exp() - (-x).exp()) / 2
@@ -167,7 +181,9 @@ def indefinite(implementation: str, folder: Path) -> float:
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):
         half_car = vehicle(speed)
-        P = stationary(excited(half_car, excitation(road_of_level(1.0), on_track(half_car.wheels, 1.0)), speed)).P
+        P = stationary_covariance(
+            vehicle_with_road(half_car, road_excitation(road_of_level(1.0), on_track(half_car.wheels, 1.0)), speed)
+        ).P
         scale = np.sqrt(np.diag(P))
         values = np.linalg.eigvalsh(P / np.outer(scale, scale))
         worst = max(worst, -values[0] / values[-1])

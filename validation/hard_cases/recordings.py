@@ -24,7 +24,7 @@ def spoilt(
     all findings name ``place``."""
 
     def error(implementation: str, folder: Path) -> float:
-        findings = bench.planted(bench.measurement(road=ROAD), folder, spoil, **faults)
+        findings = bench.planted_findings(bench.measurement(road=ROAD), folder, spoil, **faults)
         if not findings or findings[0].check != check or not all(place in finding.place for finding in findings):
             return np.inf
         return 0.0 if size is None else abs((findings[0].size or 0.0) / size - 1.0)
@@ -34,7 +34,7 @@ def spoilt(
 
 def clean(implementation: str, folder: Path) -> float:
     """Number of errors and doubts found in a clean recording."""
-    return float(len(bench.planted(bench.measurement(road=ROAD), folder)))
+    return float(len(bench.planted_findings(bench.measurement(road=ROAD), folder)))
 
 
 CASES = (
@@ -55,25 +55,25 @@ CASES = (
                 "wheel force in kN read as N",
                 "a vehicle that flies off, or a plausible bias",
                 "unit named at its channel",
-                spoilt("unit", "fl_fz", 1e-3, bench.times(1e-3, "fl_fz")),
+                spoilt("unit", "fl_fz", 1e-3, bench.scaled_channels(1e-3, "fl_fz")),
             ),
             (
                 "wheel force with the other sign",
                 "its mean is that of another load",
                 "sign named at its channel",
-                spoilt("sign", "rr_fz", -1.0, bench.times(-1.0, "rr_fz")),
+                spoilt("sign", "rr_fz", -1.0, bench.scaled_channels(-1.0, "rr_fz")),
             ),
             (
                 "clipped wheel force",
                 "the worst loads are missing, the mean hardly changes",
                 "clipping, 3 % of samples",
-                spoilt("clipped", "fl_fz", 3.0, bench.clipped("fl_fz", 0.03)),
+                spoilt("clipped", "fl_fz", 3.0, bench.clipped_channel("fl_fz", 0.03)),
             ),
             (
                 "spike of one sample",
                 "its damage is that of the whole recording; the mean hardly changes",
                 "its height",
-                spoilt("spikes", "fl_fz", 5e3, bench.spiked("fl_fz", 2.0, 5e3)),
+                spoilt("spikes", "fl_fz", 5e3, bench.spiked_channel("fl_fz", 2.0, 5e3)),
             ),
             (
                 "value held for 0.06 s",
@@ -85,13 +85,13 @@ CASES = (
                 "dead channel",
                 "a constant is a valid number",
                 "named as dead",
-                spoilt("clipped", "fr_fz", None, bench.times(0.0, "fr_fz", add=3e3)),
+                spoilt("clipped", "fr_fz", None, bench.scaled_channels(0.0, "fr_fz", add=3e3)),
             ),
             (
                 "front wheels exchanged",
                 "loads are alike left and right",
                 "the sides named",
-                spoilt("swapped", "fl with fr", None, bench.exchanged(("fl", "fr"))),
+                spoilt("swapped", "fl with fr", None, bench.exchanged_hubs(("fl", "fr"))),
             ),
             (
                 "one channel 3 ms late",

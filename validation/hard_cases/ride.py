@@ -13,18 +13,27 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.scene_file import parse
-from models.ride.covariance import DIFFUSING, INFINITE, stationary
-from models.ride.excited import excited
-from models.ride.frequency import quadrature
+from models.ride.covariance import DIFFUSING, INFINITE, stationary_covariance
+from models.ride.excited import vehicle_with_road
+from models.ride.frequency import variances_by_quadrature
 from models.ride.marginal import Unstable
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
-from models.ride.weighting import WEIGHTINGS, weighted
+from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
-from validation.ride.hard_rides import CORNER, SPEED, after_hours, closed_form, linear, quarter, single, steered
-from validation.ride.rides import INTENSITY, off, one_track, paper_road
+from validation.ride.hard_rides import (
+    QUARTER_CAR_NUMBERS,
+    SPEED,
+    after_hours,
+    closed_form,
+    linear,
+    quarter_car,
+    roll_steered_vehicle,
+    single_body,
+)
+from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_track, paper_road
 
 Change = Callable[[dict[str, Any]], object]
 
@@ -32,55 +41,59 @@ Change = Callable[[dict[str, Any]], object]
 def damped_tyre(implementation: str, folder: Path) -> float:
     """Error of the body acceleration with a damped tyre, against quadrature; the tyre's force alone must be reported as
     infinite."""
-    vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), one_track((0.0,), 0.3)
-    covariance = stationary(excited(vehicle, road, SPEED))
+    vehicle, road = linear(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation), one_track((0.0,), 0.3)
+    covariance = stationary_covariance(vehicle_with_road(vehicle, road, SPEED))
     if [status == INFINITE for status in covariance.status] != [False, False, True]:
         return np.inf
-    return off(covariance.variance[:2], quadrature(vehicle, road, SPEED).variance[:2])
+    return largest_relative_error(covariance.variance[:2], variances_by_quadrature(vehicle, road, SPEED).variance[:2])
 
 
 def damped_tyre_naive(folder: Path) -> str:
     """Without the guard: variances by the Lyapunov equation if the white noise that reaches outputs directly is
     ignored."""
-    system = excited(linear(quarter(*CORNER, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED)
+    system = vehicle_with_road(
+        linear(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED
+    )
     silent = replace(system, D=tuple(0.0 * D for D in system.D))
-    return f"C P C' gives the tyre force a standard deviation of {stationary(silent).deviation[2]:.0f} N"
+    return f"C P C' gives the tyre force a standard deviation of {stationary_covariance(silent).deviation[2]:.0f} N"
 
 
 def free_accelerations(implementation: str, folder: Path) -> float:
     """Relative error of R19-free's accelerations against the exact covariance one hour after rest, with independent
     axles."""
     vehicle = linear(load_vehicle("r19_free"), implementation)
-    system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
+    system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
-    covariance, wanted = stationary(system), after_hours(system)[0]
-    return off(covariance.variance[rows], wanted[rows])
+    covariance, wanted = stationary_covariance(system), after_hours(system)[0]
+    return largest_relative_error(covariance.variance[rows], wanted[rows])
 
 
 def drifting(implementation: str, folder: Path) -> float:
     """Errors of the growth rates of heading variance (as t) and lateral position variance (as t^3) against the exact
     covariance after 1 and 2 hours, with independent axles."""
-    vehicle = linear(steered(), implementation)
-    system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
-    covariance = stationary(system)
+    vehicle = linear(roll_steered_vehicle(), implementation)
+    system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
+    covariance = stationary_covariance(system)
     if covariance.status != (DIFFUSING, DIFFUSING) or covariance.power.tolist() != [1, 3]:
         return np.inf
     after_1, two = after_hours(system)
     grown = (two - after_1) / (2.0**covariance.power - 1.0) / 3600.0**covariance.power
-    return off(grown, covariance.rate)
+    return largest_relative_error(grown, covariance.rate)
 
 
 def undamped(corner: float) -> Callable[..., float]:
     """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
     def error(implementation: str, folder: Path) -> float:
-        undamped_car = replace(single(300.0, 2e5, 0.0), springs=())
-        covariance = stationary(excited(linear(undamped_car, implementation), one_track((0.0,), corner), SPEED))
+        undamped_car = replace(single_body(300.0, 2e5, 0.0), springs=())
+        covariance = stationary_covariance(
+            vehicle_with_road(linear(undamped_car, implementation), one_track((0.0,), corner), SPEED)
+        )
         if covariance.status != (DIFFUSING, DIFFUSING):
             return np.inf
         w2 = 2e5 / 300.0
-        height = w2 * INTENSITY * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
-        return off(covariance.rate, np.array([w2**2, 1.0]) * height)
+        height = w2 * ROAD_INTENSITY * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
+        return largest_relative_error(covariance.rate, np.array([w2**2, 1.0]) * height)
 
     return error
 
@@ -89,15 +102,17 @@ def triple(implementation: str, folder: Path) -> float:
     """Case: a critically damped body whose frequency is that of the road's corner. Error: relative difference of the
     variances from 3 q w^3 / 16 and 3 q / 16 w."""
     w = 6.0
-    covariance = stationary(
-        excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED)
+    covariance = stationary_covariance(
+        vehicle_with_road(
+            linear(single_body(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED
+        )
     )
-    return off(covariance.variance, 3.0 * INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
+    return largest_relative_error(covariance.variance, 3.0 * ROAD_INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
 
 
 def triple_naive(folder: Path) -> str:
     """Without the remedy: condition number of the eigenvectors in this case."""
-    system = excited(linear(single(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED)
+    system = vehicle_with_road(linear(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED)
     with np.errstate(all="ignore"):
         condition = np.linalg.cond(np.linalg.eig(system.A)[1])
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
@@ -105,7 +120,7 @@ def triple_naive(folder: Path) -> str:
 
 def unstable(implementation: str, folder: Path) -> float:
     """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
-    return _refused_by_growth(linear(quarter(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
+    return _refused_by_growth(linear(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
 
 
 def toppling(implementation: str, folder: Path) -> float:
@@ -118,12 +133,15 @@ def toppling(implementation: str, folder: Path) -> float:
 
 def _refused_by_growth(vehicle: LinearVehicle) -> float:
     road, growing = paper_road(vehicle.wheels), float(poles(vehicle).real.max())
-    for route in (lambda: stationary(excited(vehicle, road, SPEED)), lambda: quadrature(vehicle, road, SPEED)):
+    for route in (
+        lambda: stationary_covariance(vehicle_with_road(vehicle, road, SPEED)),
+        lambda: variances_by_quadrature(vehicle, road, SPEED),
+    ):
         try:
             route()
         except Unstable as error:
             said = error
-            if off(error.growth, growing) > 1e-9:
+            if largest_relative_error(error.growth, growing) > 1e-9:
                 return np.inf
         else:
             return np.inf
@@ -133,20 +151,22 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
 def crawling(implementation: str, folder: Path) -> float:
     """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
     vehicle = linear(load_vehicle("half_car"), implementation)
-    late, apart = (_deviation(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
-    return off(late, apart)
+    late, apart = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
+    return largest_relative_error(late, apart)
 
 
 def axles_at_one_place(implementation: str, folder: Path) -> float:
     """Case: two axles at the same x, without delay. Error: relative difference from one common input."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
-    delayed, equal = (_deviation(here, SPEED, word) for word in ("delayed", "equal"))
-    return off(delayed, equal)
+    delayed, equal = (_deviations_of_ride(here, SPEED, word) for word in ("delayed", "equal"))
+    return largest_relative_error(delayed, equal)
 
 
-def _deviation(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delayed") -> np.ndarray:
-    return stationary(excited(vehicle, paper_road(vehicle.wheels, "modelled", axles), speed)).deviation
+def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delayed") -> np.ndarray:
+    return stationary_covariance(
+        vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", axles), speed)
+    ).deviation
 
 
 def mirrored(implementation: str, folder: Path) -> float:
@@ -160,17 +180,19 @@ def mirrored(implementation: str, folder: Path) -> float:
         )
         vehicle = linear(replace(car, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
-        deviations.append(_deviation(vehicle)[rows])
-    return off(deviations[0], deviations[1])
+        deviations.append(_deviations_of_ride(vehicle)[rows])
+    return largest_relative_error(deviations[0], deviations[1])
 
 
 def slow_weighting(implementation: str, folder: Path) -> float:
     """Relative error of the body acceleration weighted by Wk at 1 mm/s, against quadrature."""
-    vehicle = linear(quarter(*CORNER), implementation)
+    vehicle = linear(quarter_car(*QUARTER_CAR_NUMBERS), implementation)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
-    variance = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
-    wanted = quadrature(vehicle, road, 1e-3, {name: WEIGHTINGS["Wk"].response}).variance[0]
-    return off(variance, wanted)
+    variance = stationary_covariance(
+        system_with_weightings(vehicle_with_road(vehicle, road, 1e-3), {name: "Wk"})
+    ).variance[-1]
+    wanted = variances_by_quadrature(vehicle, road, 1e-3, {name: WEIGHTINGS["Wk"].response}).variance[0]
+    return largest_relative_error(variance, wanted)
 
 
 def standstill(implementation: str, folder: Path) -> float:
@@ -179,7 +201,7 @@ def standstill(implementation: str, folder: Path) -> float:
     vehicle = linear(load_vehicle("half_car"), implementation)
     drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
     height = varying_speed(vehicle, paper_road(vehicle.wheels), drive).height
-    return off((height / height[0]) ** 2, 1.0)
+    return largest_relative_error((height / height[0]) ** 2, 1.0)
 
 
 def no_speed(implementation: str, folder: Path) -> float:
@@ -187,7 +209,7 @@ def no_speed(implementation: str, folder: Path) -> float:
     vehicle = linear(load_vehicle("half_car"), implementation)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
         try:
-            _deviation(vehicle, speed)
+            _deviations_of_ride(vehicle, speed)
         except InputError as error:
             said = error
         else:
@@ -207,7 +229,7 @@ def bad(change: Change, place: str) -> Callable[..., float]:
             if place not in refusal.place:
                 return np.inf
             raise
-        return float(np.isfinite(_deviation(linear(vehicle, implementation))).all()) + 1.0
+        return float(np.isfinite(_deviations_of_ride(linear(vehicle, implementation))).all()) + 1.0
 
     return error
 

@@ -16,20 +16,22 @@ from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import free_wheelset
 from models.rail.equations import Equations
 from models.rail.equations import WheelsetPath as Motion
-from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import implementation as kind_of
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
 KINDS = {name: kind_of(name) for name in IMPLEMENTATIONS}
 STEP = 5e-4
-FREE_WHEELSET = free_wheelset(CHOSEN)
+FREE_WHEELSET = free_wheelset(CHOSEN_WHEELSET)
 HEAVY_WHEELSET = FREE_WHEELSET.changed(mass=8000.0, spin_inertia=2500.0, yaw_inertia=8000.0)
 """Without suspension; so heavy and hard to turn that it stands still in steps of 0.08 ms."""
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 """What left and right exchanged make of a state; its spin is about the same axle."""
 
 
-def built_wheelset(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **options: Any) -> Equations:
+def built_wheelset(
+    implementation: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **options: Any
+) -> Equations:
     """The equations of a wheelset in an implementation, with few contact cells."""
     return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
@@ -72,10 +74,10 @@ def reversal(implementation: str, folder: Path) -> float:
     regularisation."""
     jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
-        below, above = (built_wheelset(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
+        below, above = (built_wheelset(implementation, CHOSEN_WHEELSET, middle + part) for part in (-1e-9, 1e-9))
         state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
         jumps.append(np.abs(above.rates(state) - below.rates(state)).max())
-    return float(max(jumps) * CHOSEN.mass / (CHOSEN.friction * CHOSEN.load))
+    return float(max(jumps) * CHOSEN_WHEELSET.mass / (CHOSEN_WHEELSET.friction * CHOSEN_WHEELSET.load))
 
 
 def through_zero(implementation: str, folder: Path) -> float:
@@ -146,7 +148,7 @@ def frictions(implementation: str, folder: Path) -> float:
     """Largest relative excess of a force over mu N for friction coefficients from 0 to 1."""
     shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
-        wheelset = built_wheelset(implementation, CHOSEN.changed(friction=mu), 60.0)
+        wheelset = built_wheelset(implementation, CHOSEN_WHEELSET.changed(friction=mu), 60.0)
         shares.append(beyond_friction(wheelset.run(displaced_state(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
     return max(shares)
 
@@ -154,7 +156,7 @@ def frictions(implementation: str, folder: Path) -> float:
 def pure_spin(implementation: str, folder: Path) -> float:
     """Case: steep cones roll without displacement, so that creepage is spin alone. Error: sum of both lateral forces,
     and moments about the axle, divided by mu N and mu N r."""
-    spinning = CHOSEN.changed(conicity=0.5)
+    spinning = CHOSEN_WHEELSET.changed(conicity=0.5)
     wheelset = built_wheelset(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
     bound = spinning.friction * contact["load"]
@@ -167,7 +169,7 @@ def pure_spin(implementation: str, folder: Path) -> float:
 def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
     """Largest difference (m) of a run from a run with half the step."""
     equations = built_wheelset(implementation, wheelset, speed)
-    start = equations.displaced(1e-3)
+    start = equations.displaced_state(1e-3)
     ends = [equations.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
     return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
 
@@ -185,7 +187,7 @@ def crawling(implementation: str, folder: Path) -> float:
 def symmetric(implementation: str, folder: Path) -> float:
     """Case: a wheelset in the middle of the track above its critical speed. Error: displacement, roll and yaw, which
     must stay 0."""
-    equations = built_wheelset(implementation, CHOSEN, 80.0)
+    equations = built_wheelset(implementation, CHOSEN_WHEELSET, 80.0)
     return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
@@ -238,7 +240,7 @@ def too_large_naive(folder: Path) -> str:
     """Without the guard: difference of a path without the check of loads from the path with an eighth of the step."""
     equations, ends = built_wheelset("reference"), []
     for step in (STEP, STEP / 8.0):
-        states, contacts = np.empty((1, eq.STATES)), equations.blank(1)
+        states, contacts = np.empty((1, eq.STATE_COUNT)), equations.empty_contacts(1)
         state = displaced_state(equations, **LANDING)
         eq.march(state, equations.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
@@ -342,8 +344,8 @@ CASES = (
     *(
         Case(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halved, wheelset=w, speed=v, step=h))
         for name, hard, w, v, h in (
-            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN, 200.0, 2e-4),
-            ("conicity of 0.5", "geometry far from linear", CHOSEN.changed(conicity=0.5), 20.0, 1e-4),
+            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, 200.0, 2e-4),
+            ("conicity of 0.5", "geometry far from linear", CHOSEN_WHEELSET.changed(conicity=0.5), 20.0, 1e-4),
         )
     ),
     Case(
@@ -406,7 +408,7 @@ CASES = (
             ("wheelset that runs for no time", "duration", partial(ran, duration=0.0)),
             ("every third of twenty steps", "every", partial(ran, stride=3)),
             ("wheelset at 300 m/s", "speed", partial(ran, speed=300.0)),
-            ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=np.nan)),
+            ("wheelset without a mass", "mass", lambda _: CHOSEN_WHEELSET.changed(mass=np.nan)),
             ("strips of two cells", "cells", lambda name: built_wheelset(name, cells=2).rest),
             ("strips of 2000 cells in an engine", "cells", lambda name: built_wheelset(name, cells=2000).rest),
         )

@@ -22,12 +22,12 @@ from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_quiet import installed
 from models.multibody.numbers import Handling, Tyres
 from models.multibody.plain.march import march
-from models.rail.energy import ledger
+from models.rail.energy import energy_ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULAR
-from models.rail.wheelset import CHOSEN
-from models.systems.handling.energy import energy
+from models.rail.wheelset import CHOSEN_WHEELSET
+from models.systems.handling.energy import drive_energy
 from models.systems.handling.run import Drive, build, drive_run, read_run
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
@@ -110,12 +110,12 @@ def too_long(implementation: str, folder: Path) -> float:
 def jumping(implementation: str, folder: Path) -> float:
     """Error of the energy balance of a wheelset whose contacts open and close, divided by the energy that creep
     dissipates."""
-    equations = built_wheelset(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
+    equations = built_wheelset(implementation, CHOSEN_WHEELSET.changed(profiles=Profiles()), 30.0)
     motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
     if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts["power"].max() > 0.0:
         return np.inf
-    book = ledger(Equations(equations.wheelset, equations.speed, equations.law, equations.cells), motion)
+    book = energy_ledger(Equations(equations.wheelset, equations.speed, equations.law, equations.cells), motion)
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 
@@ -138,7 +138,7 @@ def left_open(run: Drive) -> float:
     """Error of the energy balance over a run with equal steps, divided by the initial energy."""
     times, ends = run.run.times, [0, -1]
     few = Trajectory(times[ends], run.run.states[ends])
-    first, last = energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
+    first, last = drive_energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
     return float(abs(last - first - simpson(run.power(), x=times)) / first)
 
 

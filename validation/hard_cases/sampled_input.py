@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from models.core.discretisation import Estimate, errors_of, worst_of
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import SNAP, Sampled
+from models.core.signals import SNAP_SHARE, Sampled
 from models.core.time_series import write_time_series
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
@@ -105,7 +105,7 @@ class ByTime(Sampled):
     def sample(self, start: float, step: float, count: int) -> np.ndarray:
         """Values at start + i step."""
         periods = (start + step * np.arange(count)) / self.period
-        return self.values[np.floor(periods + SNAP).astype(int).clip(0, len(self.values) - 1)]
+        return self.values[np.floor(periods + SNAP_SHARE).astype(int).clip(0, len(self.values) - 1)]
 
 
 def halved_naive(folder: Path) -> str:
@@ -124,7 +124,7 @@ def halved_naive(folder: Path) -> str:
 
 
 @cache
-def _points() -> tuple[np.ndarray, np.ndarray]:
+def _profile_points() -> tuple[np.ndarray, np.ndarray]:
     """Profile points of a smooth road every 0.237 m, none of which falls on a step."""
     s = 0.237 * np.arange(-20, 100)
     rise = np.clip(s / 3.0, 0, 1) ** 3
@@ -142,12 +142,12 @@ def order(engine: str, profile: SplineProfile) -> float:
 
 def c2_road(engine: str, folder: Path) -> float:
     """Observed order on a road that is a C2 spline through the points."""
-    return max(0.0, 4.0 - order(engine, SplineProfile.through(*_points())))
+    return max(0.0, 4.0 - order(engine, SplineProfile.through(*_profile_points())))
 
 
 def polyline_naive(folder: Path) -> str:
     """Without the remedy: observed order on straight lines through the points."""
-    observed = order("reference", PolylineProfile.through(*_points()))
+    observed = order("reference", PolylineProfile.through(*_profile_points()))
     return f"straight lines through the same points: order {observed:.1f}"
 
 
@@ -218,7 +218,7 @@ def uneven(engine: str, folder: Path) -> float:
 
 
 @cache
-def _bump() -> RoadUnderWheels:
+def _road_with_bump() -> RoadUnderWheels:
     """Road with a bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
     station = 0.1 * np.arange(2300)
     height = -0.05 * np.exp(-(((station - 200.0) / 0.15) ** 2))
@@ -229,7 +229,7 @@ def bump(engine: str, folder: Path) -> float:
     """Case: an adaptive solver, after ten seconds of flat road, must not step over the bump (MuJoCo has no adaptive
     solver)."""
     name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
-    assembly = vehicle().with_input("road", _bump())
+    assembly = vehicle().with_input("road", _road_with_bump())
     path = run(engine, assembly, 1e-3, 10.5, name)
     truth = run("reference", assembly, 5e-4, 10.5).states[:, 3]
     return abs(largest_magnitude(path.states[:, 3]) - largest_magnitude(truth)) / largest_magnitude(truth)
@@ -237,7 +237,7 @@ def bump(engine: str, folder: Path) -> float:
 
 def bump_naive(folder: Path) -> str:
     """Without the remedy: the bump by scipy's LSODA with default settings."""
-    assembly = vehicle().with_input("road", _bump())
+    assembly = vehicle().with_input("road", _road_with_bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
         lambda t, y: np.concatenate((y[4:], model.acceleration(t, y[:4], y[4:]))),

@@ -13,13 +13,13 @@ from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.engines.protocol import unchecked as build_unchecked
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Word
 
-IMPLICIT = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
+IMPLICIT_INTEGRATORS = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
 """For each implementation an integrator that no step makes unstable."""
-CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+CONSTRAINED_INTEGRATORS = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 """In every implementation."""
@@ -41,7 +41,7 @@ def vehicle(
             "effects": effects or {},
         }
     )
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
 
 
@@ -50,7 +50,7 @@ def driven_by_forces(base: Assembly, forces: Signal, mode: Mode = "force") -> As
     return base.without_tyres().with_input(mode, forces)
 
 
-def guided(base: Assembly, forces: Signal, pitch: Signal) -> Assembly:
+def guided_vehicle(base: Assembly, forces: Signal, pitch: Signal) -> Assembly:
     """The vehicle driven by forces, with a prescribed pitch signal that has two derivatives; its start is
     consistent."""
     start = base.initial.copy()
@@ -84,7 +84,7 @@ def run(
     return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
 
 
-def unchecked(
+def unchecked_run(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
     """A run without the checks before it; only the guard after the run is active."""
@@ -131,6 +131,6 @@ def largest_magnitude(difference: np.ndarray) -> float:
     return float(np.abs(difference).max())
 
 
-def rms(values: np.ndarray) -> float:
+def root_mean_square(values: np.ndarray) -> float:
     """Root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

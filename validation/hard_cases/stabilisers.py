@@ -15,25 +15,25 @@ from models.core.time_series import write_time_series
 from models.core.trajectory import Trajectory
 from models.engines import exudyn as exudyn_engine
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import (
-    CONSTRAINED,
+    CONSTRAINED_INTEGRATORS,
     REFUSED,
     driven_by_forces,
     largest_magnitude,
-    rms,
+    root_mean_square,
     run,
     static_forces,
     tight_solution,
-    unchecked,
+    unchecked_run,
     vehicle,
 )
 
 STEP, DURATION = 1e-3, 0.5
-BAND, STIFFNESS = 0.02, 1e5
+DEAD_BAND, STIFFNESS = 0.02, 1e5
 """rad, N m/rad: the pitch crosses the band in 0.1 s and turns round within 0.1 s."""
 NOISE = 1e-6
 
@@ -50,13 +50,13 @@ def sprung(band: float) -> Assembly:
 
 def kink(engine: str, folder: Path) -> float:
     """Error of the pitch after many crossings of the dead band's edges."""
-    path = run(engine, sprung(BAND), STEP, DURATION)
+    path = run(engine, sprung(DEAD_BAND), STEP, DURATION)
     return largest_magnitude((path.states - _kink_truth().states)[:, 3])
 
 
 @cache
 def _kink_truth() -> Trajectory:
-    return tight_solution(sprung(BAND), STEP, DURATION)
+    return tight_solution(sprung(DEAD_BAND), STEP, DURATION)
 
 
 def kink_naive(folder: Path) -> str:
@@ -110,7 +110,7 @@ def _moving_truth() -> Trajectory:
 
 def moving_moment_naive(folder: Path) -> str:
     """Without the remedy: error if the moment is held over a sample like the forces."""
-    path = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
+    path = unchecked_run("reference", beside_held(moment_held=True), STEP, DURATION)
     return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
@@ -143,14 +143,14 @@ def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
     return assembly.without_tyres().with_input("heave-pitch", signal)
 
 
-def _guided(engine: str, assembly: Assembly) -> Trajectory:
-    return run(engine, assembly, 2.5e-4, DURATION, CONSTRAINED[engine])
+def _guided_run(engine: str, assembly: Assembly) -> Trajectory:
+    return run(engine, assembly, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine])
 
 
 def missing_mass(engine: str, folder: Path) -> float:
     """Mean stabilising force of a model whose chassis is 5 % too light, relative to 0.05 m3 (g - z3'')."""
     p, states = vehicle("asymmetric_twin").parameters, _free_motion()
-    force = _guided(engine, on_rails(mass=0.95)).force
+    force = _guided_run(engine, on_rails(mass=0.95)).force
     assert force is not None
     wanted = 0.05 * p.m3 * (p.g - (states[-1, 6] - states[0, 6]) / DURATION)
     return abs(float(force.mean()) / wanted - 1)
@@ -158,7 +158,7 @@ def missing_mass(engine: str, folder: Path) -> float:
 
 def missing_mass_naive(folder: Path) -> str:
     """Difference between the states of guided runs with the true and a wrong mass, as a sentence."""
-    whole, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
+    whole, other = (_guided_run("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
     return f"the states of the guided run differ by {largest_magnitude(whole - other):.1e}: only the force can tell"
 
 
@@ -166,7 +166,10 @@ def rough_rails(engine: str, folder: Path) -> float:
     """Case: noise of 1e-6 m and rad on prescribed heave and pitch. Error: rms change of enforced force and moment,
     divided by the finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
-    enforced, clean = _guided(engine, on_rails(NOISE)).enforced, _guided("reference", on_rails()).enforced
+    enforced, clean = (
+        _guided_run(engine, on_rails(NOISE)).guiding_forces,
+        _guided_run("reference", on_rails()).guiding_forces,
+    )
     assert enforced is not None and clean is not None
     sizes = np.array([p.m3, p.I]) * NOISE * np.sqrt(6) / 2.5e-4**2
     return float((np.sqrt(np.mean((enforced - clean) ** 2, axis=0)) / sizes).max())
@@ -182,40 +185,42 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
         "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
         "prescribed_pitch": {"file": "pitch.csv", **values},
     }
-    return assemble(build_scene({"title": "hard case", "run": {"duration": 1.0}, "effects": effects}, "", folder))
+    return assembly_of_scene(
+        build_scene({"title": "hard case", "run": {"duration": 1.0}, "effects": effects}, "", folder)
+    )
 
 
 def smoothed(engine: str, folder: Path) -> float:
     """Case: a pitch smoothed to 5 Hz is prescribed. Error: difference of the enforced moment from the form in which the
     pitch is eliminated, divided by its rms."""
     assembly = measured_pitch(folder, bandwidth=5.0)
-    moment = run(engine, assembly, STEP, 1.0, CONSTRAINED[engine]).moment
+    moment = run(engine, assembly, STEP, 1.0, CONSTRAINED_INTEGRATORS[engine]).moment
     true = run("reference", assembly, STEP / 8, 1.0).moment
     assert moment is not None and true is not None
-    return rms((moment - true[::8])[50:]) / rms(true)
+    return root_mean_square((moment - true[::8])[50:]) / root_mean_square(true)
 
 
 def smoothed_naive(folder: Path) -> str:
     """Without the remedy: the noisy pitch is used without smoothing."""
     raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
     assert raw is not None
-    return f"without a bandwidth the moment is {rms(raw):.1e} N m rms, and Exudyn's multiplier raises"
+    return f"without a bandwidth the moment is {root_mean_square(raw):.1e} N m rms, and Exudyn's multiplier raises"
 
 
 def beyond_nyquist(engine: str, folder: Path) -> float:
     """Case: a smoothing bandwidth above half of the file's sampling rate must be refused."""
-    run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED[engine])
+    run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED_INTEGRATORS[engine])
     return 0.0
 
 
-def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
+def _refused_scene(effects: dict[str, Any]) -> Callable[[str, Path], float]:
     """Case: a scene under wheel forces with these effects must be refused."""
 
     def error(engine: str, folder: Path) -> float:
         measured_pitch(folder)  # writes the files
         forces = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
         table = {"title": "hard case", "run": {"duration": 1.0}, "effects": forces | effects}
-        run(engine, assemble(build_scene(table, "", folder)), STEP, 1.0)
+        run(engine, assembly_of_scene(build_scene(table, "", folder)), STEP, 1.0)
         return 0.0
 
     return error
@@ -318,7 +323,7 @@ CASES = (
         "",
         0.0,
         "an error would grow",
-        _refusing({"high_pass": {"cut_off": 1000.0}}),
+        _refused_scene({"high_pass": {"cut_off": 1000.0}}),
         REFUSED,
         against="none",
     ),
@@ -329,7 +334,7 @@ CASES = (
         "",
         0.0,
         "a scene that says two things",
-        _refusing({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
+        _refused_scene({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
         REFUSED,
         against="none",
     ),

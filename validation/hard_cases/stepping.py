@@ -15,8 +15,8 @@ from models.engines.protocol import build
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.hard_cases.setups import (
-    CONSTRAINED,
-    IMPLICIT,
+    CONSTRAINED_INTEGRATORS,
+    IMPLICIT_INTEGRATORS,
     RAISED,
     REFUSED,
     driven_by_forces,
@@ -27,7 +27,7 @@ from validation.hard_cases.setups import (
     settings,
     static_forces,
     tight_solution,
-    unchecked,
+    unchecked_run,
     vehicle,
 )
 
@@ -35,7 +35,7 @@ ROAD = {"road": {"source": "study", "speed": 20.0}}
 EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
 
 
-def _pushed(geometry: str = "linear"):
+def _displaced_vehicle(geometry: str = "linear"):
     """The vehicle with one wheel displaced by 1 mm from equilibrium."""
     base = vehicle(geometry=geometry)
     return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
@@ -43,7 +43,7 @@ def _pushed(geometry: str = "linear"):
 
 def inside_limit(engine: str, folder: Path) -> float:
     """Case: RK4 with 300 steps of 3.9 ms, just inside the stability limit; the fastest mode must have decayed."""
-    assembly = _pushed()
+    assembly = _displaced_vehicle()
     path = run(engine, assembly, 3.9e-3, 1.17)
     return largest_magnitude(path.states[-1] - exact_states(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
@@ -65,7 +65,7 @@ def beyond_limit_naive(folder: Path) -> str:
     """Without the guard: the run beyond the stability limit."""
     assembly = vehicle(effects=ROAD)
     shares = [
-        _against_tight(assembly, unchecked(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
+        _against_tight(assembly, unchecked_run(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
     ]
     return f"unchecked, all three answer, finite, off by {min(shares):.0%} to {max(shares):.0%} of the motion"
 
@@ -73,15 +73,15 @@ def beyond_limit_naive(folder: Path) -> str:
 def reset(engine: str, folder: Path) -> float:
     """Case: RK4 at 8 ms with checks bypassed, so that only the guard after the run remains."""
     assembly = vehicle(effects=ROAD)
-    return _against_tight(assembly, unchecked(engine, assembly, 8e-3, 2.0).states, 8e-3)
+    return _against_tight(assembly, unchecked_run(engine, assembly, 8e-3, 2.0).states, 8e-3)
 
 
 def reset_naive(folder: Path) -> str:
     """Without the guard: MuJoCo resets the state, and its time starts again."""
-    model = mujoco_engine.MujocoModel(_pushed("exact"), settings("mujoco", 8e-3, 2.0)).model
+    model = mujoco_engine.MujocoModel(_displaced_vehicle("exact"), settings("mujoco", 8e-3, 2.0)).model
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
-    data.qpos[:] = _pushed("exact").initial[:4]
+    data.qpos[:] = _displaced_vehicle("exact").initial[:4]
     resets, before = 0, 0.0
     with without_warnings():
         for _ in range(250):
@@ -93,12 +93,12 @@ def reset_naive(folder: Path) -> str:
 def huge(engine: str, folder: Path) -> float:
     """Case: a first-order explicit method at 5 ms with checks bypassed."""
     assembly = vehicle(effects=ROAD)
-    return _against_tight(assembly, unchecked(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
+    return _against_tight(assembly, unchecked_run(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
 
 
 def huge_naive(folder: Path) -> str:
     """Without the guard: Exudyn's own success flag, and the largest finite state."""
-    assembly = vehicle(geometry="linear", initial=_pushed().initial)
+    assembly = vehicle(geometry="linear", initial=_displaced_vehicle().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     said = not solve(model.built.mbs, model.settings)
     _, states = model._recorded()
@@ -124,7 +124,7 @@ def _step_force():
 def sudden_naive(folder: Path) -> str:
     """Without the remedy: generalised-alpha with a step that does not resolve the fast pole."""
     assembly, forces = _step_force()
-    path = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
+    path = unchecked_run("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
     truth = exact_states(assembly, 10e-3, 20, forces.values)
     off = (path.states - truth)[6:9, 4]
     return (
@@ -139,7 +139,7 @@ def repeat(engine: str, folder: Path) -> float:
     base = vehicle()
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
-    for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT[engine]):
+    for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT_INTEGRATORS[engine]):
         signal = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
         model = build(engine, driven_by_forces(base, signal), settings(engine, 1e-3, 0.2, integrator))
         first = model.run().states
@@ -162,14 +162,14 @@ def stamps(engine: str, folder: Path) -> float:
     """Error of an adaptive run, with each row compared at its own time."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
-    assembly = _pushed()
+    assembly = _displaced_vehicle()
     path = run(engine, assembly, 1e-3, 0.2, name)
     return largest_magnitude(path.states - exact_decay(assembly, path.times))
 
 
 def stamps_naive(folder: Path) -> str:
     """Without the remedy: error if row numbers are used as times."""
-    assembly = _pushed()
+    assembly = _displaced_vehicle()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
     off = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
     truth = exact_states(assembly, 1e-3, len(path.times) - 1)
@@ -188,7 +188,7 @@ def keeps_order(engine: str, folder: Path) -> float:
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact_states(base, 0.1, 2)[-1], []
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
-        end = run(engine, base, step, 0.2, CONSTRAINED[engine]).states[-1]
+        end = run(engine, base, step, 0.2, CONSTRAINED_INTEGRATORS[engine]).states[-1]
         errors.append(largest_magnitude(end - truth))
     return float(ORDERS[engine] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
@@ -20,7 +20,7 @@ from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
-PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
+PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
 SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
@@ -34,7 +34,7 @@ SEED = 81
 
 
 @cache
-def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
+def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
     """Signals and their true samples (n, 60), for one repetition of the recording and the transition to the next."""
     car = r19()
     names = [element.name for element in car.elements]
@@ -49,34 +49,34 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
     return virtual.signals, virtual.samples(Faults(), 1)
 
 
-def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
+def sample_blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
     """Samples (n, 60) of a recording of a length (s), one block after the other."""
-    signals, whole = pattern(repeated)
+    signals, whole = repeated_pattern(repeated)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
-    length, count = len(whole) - SEAM, round(seconds / PERIOD) + 1
-    fade = np.linspace(0.0, 1.0, SEAM, endpoint=False)[:, None]
+    length, count = len(whole) - SEAM_SAMPLES, round(seconds / PERIOD) + 1
+    fade = np.linspace(0.0, 1.0, SEAM_SAMPLES, endpoint=False)[:, None]
     once = whole[:length].copy()
-    once[:SEAM] = fade * whole[:SEAM] + (1 - fade) * whole[length:]
+    once[:SEAM_SAMPLES] = fade * whole[:SEAM_SAMPLES] + (1 - fade) * whole[length:]
     for first in range(0, count, BLOCK):
         at = np.arange(first, min(first + BLOCK, count))
         values = once[at % length]
         if first == 0:
-            values[: min(SEAM, count)] = whole[: min(SEAM, count)]  # begins at rest
-        yield values + normal(SEED, 0, len(at), 60, first) * deviation
+            values[: min(SEAM_SAMPLES, count)] = whole[: min(SEAM_SAMPLES, count)]  # begins at rest
+        yield values + normal_samples(SEED, 0, len(at), 60, first) * deviation
 
 
-def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
+def long_recording(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
     """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
     are missing."""
-    signals, _ = pattern(repeated)
+    signals, _ = repeated_pattern(repeated)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
-    for values in blocks(seconds, repeated) if columns.done == 0 else ():
+    for values in sample_blocks(seconds, repeated) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count
     return Recording(signals, columns, PERIOD)
 
 
-def sections() -> Sections:
+def recorded_sections() -> Sections:
     """All sections in which forces are computed, and the positions of the accelerometers."""
     return Sections(
         r19(), points=tuple(AccelerometerPoint(name, "body", place) for name, place in SENSOR_PLACES.items())
@@ -92,8 +92,8 @@ def run_of(
     step: float | None = None,
 ) -> SectionRun:
     """A run of a recording in this folder; the recording is made if it is missing."""
-    recording = recorded(seconds, folder / "recording.f64", repeated)
-    return SectionRun(r19(), recording, sections(), engine, hold or AttitudeHold(), step)
+    recording = long_recording(seconds, folder / "recording.f64", repeated)
+    return SectionRun(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
 
 
 def answers_of(folder: Path, name: str = "run") -> bytes:
@@ -101,7 +101,9 @@ def answers_of(folder: Path, name: str = "run") -> bytes:
     return (folder / name / "run.f64").read_bytes()
 
 
-def killed(folder: Path, seconds: float, repeated: float, block: float, times: int, lasting: float = 1.0) -> int:
+def run_killed_process(
+    folder: Path, seconds: float, repeated: float, block: float, times: int, lasting: float = 1.0
+) -> int:
     """Run in a separate process, which is killed (signal 9) ``times`` times at random moments and restarted until it
     ends; returns the number of starts.
 

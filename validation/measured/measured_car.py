@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.sensors.rotations import matrix
+from models.sensors.rotations import rotation_matrix
 from models.systems.measured.scene import MeasuredScene, build
 from models.vehicles.cut_vehicle import CutVehicle
 from validation.measured import recording as car
@@ -26,7 +26,7 @@ CHANNELS: tuple[tuple[str, Quantity, str], ...] = (
     ("roll", "angle", "roll"),
     ("pitch", "angle", "pitch"),
 )
-TURNED = np.array([1.0, -1.0, -1.0])
+TELEPHONE_TO_CAR = np.array([1.0, -1.0, -1.0])
 """The telephone's x forward, y right, z down into x forward, y left, z up."""
 
 
@@ -42,9 +42,14 @@ def samples(path: Path) -> np.ndarray:
         clock = np.arange(begin, end, car.PERIOD)
         felt = np.column_stack([np.interp(clock, data["acc_t"], column) for column in data["acc"].T])
         place = data["frame_p"].mean(axis=0)
-    up = np.einsum("nji,j->ni", matrix(read_car.pose), place / np.linalg.norm(place)) * TURNED
+    up = np.einsum("nji,j->ni", rotation_matrix(read_car.pose), place / np.linalg.norm(place)) * TELEPHONE_TO_CAR
     return np.column_stack(
-        [felt * TURNED, read_car.rates * TURNED, np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(up[:, 0])]
+        [
+            felt * TELEPHONE_TO_CAR,
+            read_car.rates * TELEPHONE_TO_CAR,
+            np.arctan2(up[:, 1], up[:, 2]),
+            -np.arcsin(up[:, 0]),
+        ]
     )
 
 

@@ -12,9 +12,9 @@ from scipy.interpolate import make_interp_spline
 from models.core.finding import Finding
 from models.measured.checks import check
 from models.measured.faults_of_measurement import Faults
-from models.measured.signal import HUB, TransducerPlace
+from models.measured.signal import HUB_COMPONENTS, TransducerPlace
 from models.systems.hub_forces.scene import Road
-from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
@@ -31,12 +31,12 @@ Spoil = Callable[[VirtualMeasurement, np.ndarray], None]
 """Changes samples (n, signals) where they are."""
 
 
-def columns(virtual: VirtualMeasurement, *names: str) -> list[int]:
+def column_numbers(virtual: VirtualMeasurement, *names: str) -> list[int]:
     """Column numbers of the named channels."""
     return [[s.name for s in virtual.signals].index(name) for name in names]
 
 
-def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
+def spoiling_function(change: Callable[..., None]) -> Callable[..., Spoil]:
     """Decorator: the function is called with its settings alone and returns a change of a recording's samples."""
 
     def made(*settings: Any, **named: Any) -> Spoil:
@@ -45,58 +45,62 @@ def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
     return wraps(change)(made)
 
 
-@spoiling
-def times(virtual: VirtualMeasurement, samples: np.ndarray, factor: float, *names: str, add: float = 0.0) -> None:
+@spoiling_function
+def scaled_channels(
+    virtual: VirtualMeasurement, samples: np.ndarray, factor: float, *names: str, add: float = 0.0
+) -> None:
     """Fault: samples of some channels are multiplied by a factor, and a constant is added."""
-    samples[:, columns(virtual, *names)] = factor * samples[:, columns(virtual, *names)] + add
+    samples[:, column_numbers(virtual, *names)] = factor * samples[:, column_numbers(virtual, *names)] + add
 
 
-@spoiling
-def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
+@spoiling_function
+def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
     """Fault: all channels of two hubs are exchanged."""
     for pair in pairs:
-        first, second = (columns(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB)) for hub in pair)
+        first, second = (
+            column_numbers(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB_COMPONENTS)) for hub in pair
+        )
         samples[:, first + second] = samples[:, second + first]
 
 
-@spoiling
+@spoiling_function
 def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
     """Fault: a channel is NaN for ``length`` (s) from ``begin`` (s) on."""
     first = round(begin / virtual.period)
-    samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
+    samples[first : first + round(length / virtual.period), column_numbers(virtual, name)] = np.nan
 
 
-@spoiling
+@spoiling_function
 def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
     """Fault: a channel keeps its value for ``length`` (s) from ``begin`` (s) on."""
-    first, (column,) = round(begin / virtual.period), columns(virtual, name)
+    first, (column,) = round(begin / virtual.period), column_numbers(virtual, name)
     samples[first : first + round(length / virtual.period), column] = samples[first, column]
 
 
-@spoiling
-def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: float, height: float) -> None:
+@spoiling_function
+def spiked_channel(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: float, height: float) -> None:
     """Fault: one sample of a channel is too high."""
-    samples[round(time / virtual.period), columns(virtual, name)] += height
+    samples[round(time / virtual.period), column_numbers(virtual, name)] += height
 
 
-@spoiling
-def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, share: float) -> None:
+@spoiling_function
+def clipped_channel(virtual: VirtualMeasurement, samples: np.ndarray, name: str, share: float) -> None:
     """Fault: the largest samples of a channel are cut off."""
-    (column,) = columns(virtual, name)
+    (column,) = column_numbers(virtual, name)
     samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - share))
 
 
-@spoiling
-def referred(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hubs: str) -> None:
+@spoiling_function
+def moments_about_point(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hubs: str) -> None:
     """Fault: hub moments are about a point ``lever`` (m) above the hubs: (Mx + r Fy, My - r Fx)."""
     for hub in hubs:
-        fx, fy, mx, my = columns(virtual, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
+        fx, fy, mx, my = column_numbers(virtual, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
         samples[:, mx] += lever * samples[:, fy]
         samples[:, my] -= lever * samples[:, fx]
 
 
 @dataclass(frozen=True)
-class Planted:
+class PlantedMeasurementFault:
     """A planted fault, the ``check`` that must name it at a ``place``, and its ``size`` in ``unit``."""
 
     name: str
@@ -133,26 +137,26 @@ def _vehicle(name: str) -> CutVehicle:
         "r19_free": whole,
         "twin": twin(),
         "loaded": replace(whole, bodies=(replace(body, mass=body.mass + 80), *others)),
-        "stiff": _sprung(whole, 1.2, 1.0),
-        "worn": _sprung(whole, 1.0, 0.7),
+        "stiff": _suspended_vehicle(whole, 1.2, 1.0),
+        "worn": _suspended_vehicle(whole, 1.0, 0.7),
     }
     return cut(vehicles[name], "body")
 
 
-def _sprung(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
+def _suspended_vehicle(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
     springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in vehicle.springs)
     return replace(vehicle, springs=springs)
 
 
 def errors_and_doubts(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts that the checks find in samples (m, signals)."""
-    spoilt = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
+    spoilt = recording_of_samples(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
     places = {name: TransducerPlace("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
     claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
     return tuple(finding for finding in check(spoilt, virtual.vehicle, places, claimed) if finding.weight != "note")
 
 
-def planted(
+def planted_findings(
     virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
 ) -> tuple[Finding, ...]:
     """Errors and doubts found in a recording with transducer faults and changed samples."""
@@ -163,7 +167,7 @@ def planted(
     return errors_and_doubts(virtual, samples, folder)
 
 
-def drifting(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
+def drifting_findings(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts found if all signals but the hub forces come from a file whose clock runs fast by a
     fraction."""
     samples, driving = virtual.samples(Faults(noise=NOISE), SEED), ("force", "moment")

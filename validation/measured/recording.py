@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from models.sensors.rotations import conjugate, integrate, logarithm, product
+from models.sensors.rotations import conjugate_quaternion, integrate, quaternion_product, rotation_vector
 from validation.common.scenes import data_folder
 
-FILE = "comma2k19_example_60s.npz"
+RECORDING_FILE = "comma2k19_example_60s.npz"
 """Not part of the repository. Both frames are x forward, y right, z down; the pose turns them to the earth's."""
 PERIOD = 0.01
 """s; the clock of the recording wanders by 0.6 % and is read on this one."""
@@ -27,7 +27,7 @@ class Recording:
 def find() -> Path | None:
     """Path of the recording; None if TWINRIG_DATA does not lead to it."""
     folder = data_folder()
-    return folder / FILE if folder and (folder / FILE).is_file() else None
+    return folder / RECORDING_FILE if folder and (folder / RECORDING_FILE).is_file() else None
 
 
 def read(path: Path) -> Recording:
@@ -44,4 +44,4 @@ def read(path: Path) -> Recording:
 def gyro_error(recording: Recording) -> np.ndarray:
     """Angle (n,) in rad between the attitude by the gyro alone, started at the camera's attitude, and the camera's."""
     attitudes = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
-    return np.linalg.norm(logarithm(product(conjugate(recording.pose), attitudes)), axis=1)
+    return np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(recording.pose), attitudes)), axis=1)

@@ -6,7 +6,7 @@ RADIUS = 0.31
 """m: height of the wheels' centres."""
 
 
-def _front(name: str, sign: int) -> str:
+def _front_strut_text(name: str, sign: int) -> str:
     """Text of a front strut with an upright that steers, and a spinning wheel on it."""
     x, y = CORNERS[name]
     return f"""
@@ -21,7 +21,7 @@ def _front(name: str, sign: int) -> str:
      <site name="tyre {name}" user="190000 150 62000"/></body></body></body>"""
 
 
-def _rear(name: str, sign: int) -> str:
+def _rear_arm_text(name: str, sign: int) -> str:
     """Text of a trailing arm on a hinge with a spring, and a spinning wheel at its end."""
     x, y = CORNERS[name]
     return f"""
@@ -38,7 +38,7 @@ SALOON = f"""<mujoco model="saloon"><compiler angle="radian"/><option gravity="0
  <body name="body" pos="0 0 .55"><freejoint name="root"/>
   <inertial pos="-.05 .01 .02" mass="1150" fullinertia="420 1750 1950 12 -25 4"/>
   <site name="driver" pos="0 .35 .1"/>
-  {_front("fl", 1)}{_front("fr", -1)}{_rear("rl", 1)}{_rear("rr", -1)}
+  {_front_strut_text("fl", 1)}{_front_strut_text("fr", -1)}{_rear_arm_text("rl", 1)}{_rear_arm_text("rr", -1)}
   <body name="engine" pos="1.1 .05 .05"><joint name="engine roll" axis="1 0 0" stiffness="60000" damping="400"/>
    <joint name="engine bounce" type="slide" axis="0 0 1" stiffness="400000" damping="1500"/>
    <inertial pos=".1 0 .05" mass="140" diaginertia="7 14 13"/></body>

@@ -24,7 +24,7 @@ def softly_coupled(twin: TwinModel) -> Equations:
     """Equations of a model whose constraints are soft, by the law of MuJoCo's documentation; nothing else may be soft
     in it."""
     tree, constraints = plain_tree(twin), plain_constraints(twin)
-    give, scale = _compliance(twin), _scale(twin)
+    give, scale = _row_compliance(twin), _row_factors(twin)
 
     def move(q: np.ndarray, v: np.ndarray) -> Moved:
         mass, force = tree.mass_and_force(0.0, q, v)
@@ -36,30 +36,33 @@ def softly_coupled(twin: TwinModel) -> Equations:
     return move
 
 
-def _scale(twin: TwinModel) -> np.ndarray:
+def _row_factors(twin: TwinModel) -> np.ndarray:
     """Factors (c,) of the constraint rows: first those of couplings and points, then those of rotations."""
     driven = twin.driven
     welds = [QUATERNION * each.torque_scale for each in driven.connections if each.axes is not None]
     return np.concatenate((np.ones(len(driven.couplings) + 3 * len(driven.connections)), np.repeat(welds, 3)))
 
 
-def _compliance(twin: TwinModel) -> np.ndarray:
+def _row_compliance(twin: TwinModel) -> np.ndarray:
     """Regularisation R (c,) of every constraint row."""
     driven, tree = twin.driven, plain_tree(twin)
     mass, _ = tree.mass_and_force(0.0, *np.zeros((2, twin.size)))
     inverse = np.linalg.inv(mass)
     rows, _ = tie_rows(driven.couplings, twin.size)
-    ties = np.array([_share(tie.solimp) for tie in driven.couplings]) * ((rows != 0.0) @ inverse.diagonal())
-    light = [(_share(each.solimp) * _lightness(twin, inverse, each.ends), each.axes) for each in driven.connections]
+    ties = np.array([_impedance_share(tie.solimp) for tie in driven.couplings]) * ((rows != 0.0) @ inverse.diagonal())
+    light = [
+        (_impedance_share(each.solimp) * _mean_inverse_inertia(twin, inverse, each.ends), each.axes)
+        for each in driven.connections
+    ]
     shifts, turns = [each[0] for each, _ in light], [each[1] for each, axes in light if axes is not None]
     return np.concatenate((ties, np.repeat(shifts, 3), np.repeat(turns, 3)))
 
 
-def _share(solimp: tuple[float, ...]) -> float:
+def _impedance_share(solimp: tuple[float, ...]) -> float:
     return (1.0 - solimp[0]) / solimp[0]
 
 
-def _lightness(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> np.ndarray:
+def _mean_inverse_inertia(twin: TwinModel, inverse: np.ndarray, ends: tuple) -> np.ndarray:
     """Mean inverse inertias (2,) of a connection, summed over both bodies: for translation (1/kg) and for rotation
     (1/(kg m^2))."""
     bodies, total = plain_tree(twin).bodies, np.zeros(2)

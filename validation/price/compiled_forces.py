@@ -22,7 +22,7 @@ PARAMETERS = 17
 """Rows per second and number of rows, before the vehicle's fifteen parameters."""
 
 
-def _compile(numeric, passive, time, position, velocity):
+def _compile_law(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
         header = carray(array_at(model, numeric), (PARAMETERS,))
@@ -50,7 +50,7 @@ def _compile(numeric, passive, time, position, velocity):
 @cache
 def law() -> Any:
     """The callback, compiled at its first use."""
-    return _compile(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
+    return _compile_law(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
 
 
 class CompiledForces:

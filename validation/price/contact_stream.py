@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from models.contact.material import MaterialPair
-from models.ensemble.workers import processes
+from models.ensemble.workers import process_pool
 from models.systems.contact.cases_table import answer_table
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
@@ -25,7 +25,7 @@ PERIOD = 1000
 HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
 
 
-class Taken(NamedTuple):
+class ProcessCost(NamedTuple):
     """Peak memory (bytes) and computing time (s) of a process that computed a table of contacts."""
 
     memory: int
@@ -41,7 +41,7 @@ def write(path: Path, rows: int) -> None:
         file.writelines(text for _ in range(rows // PERIOD))
 
 
-def answered(folder: Path, rows: int) -> Taken:
+def answered(folder: Path, rows: int) -> ProcessCost:
     """Compute a table of ``rows`` contacts into ``forces.csv``, without errors and with few cells."""
     write(folder / "cases.csv", rows)
     begun = time.perf_counter()
@@ -50,13 +50,13 @@ def answered(folder: Path, rows: int) -> Taken:
     )
     if counts != {"rows": rows, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {rows} sound rows")
-    return Taken(peak_memory(), time.perf_counter() - begun)
+    return ProcessCost(peak_memory(), time.perf_counter() - begun)
 
 
-def in_fresh_process(function: Callable[[Path, int], Taken], rows: int) -> Taken:
+def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) -> ProcessCost:
     """Result of function(folder, rows) in a process of its own."""
-    with TemporaryDirectory() as name, processes(1) as executor:
-        taken: Taken = executor.submit(function, Path(name), rows).result()
+    with TemporaryDirectory() as name, process_pool(1) as executor:
+        taken: ProcessCost = executor.submit(function, Path(name), rows).result()
         return taken
 
 

@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 
 from models.advice.price.runner import MeasuredPoints, Point
 from models.drawing.figures import (
-    BAD,
     BLUE,
     COLOURS,
     COLUMN_WIDTH,
@@ -20,42 +19,43 @@ from models.drawing.figures import (
     GREEN,
     GREY,
     PINK,
+    REJECTED_COLOUR,
     SKY,
     SMALL_TEXT,
     TITLE_TEXT,
     VERMILION,
-    heading,
+    add_heading,
     subplots,
-    wrapped,
+    wrapped_text,
 )
-from validation.price.tables import named
+from validation.price.tables import curve_name
 
 Style = dict[str, Any]
-SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
+SHARED_MARKERS = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 """Markers of methods that several engines have."""
-MARKERS = "s^v<>PXhp*d"
+OTHER_MARKERS = "s^v<>PXhp*d"
 """Markers of the others, in turn within each engine."""
-STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
+ORDER_STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
 FAMILY_COLOURS = (GREY, BLUE, GREEN, PINK, VERMILION, SKY)
 """Colours of families that are no implementation."""
 LONGEST_LABEL = 27
 """Letters of a curve's name of which four stand beside each other."""
-SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
+MARKER_SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
 """Coinciding curves show as rings within each other."""
 SINGLE_RUN_MARKER = 0.5
 """Size of a marker whose seconds are those of one run, divided by that of the others."""
-FRONT: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
-BROKEN: Style = {
+FRONT_STYLE: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
+BROKEN_STYLE: Style = {
     "marker": "o",
     "linestyle": "none",
     "markersize": 8.5,
     "markerfacecolor": "none",
-    "markeredgecolor": BAD,
+    "markeredgecolor": REJECTED_COLOUR,
     "markeredgewidth": 0.8,
 }
-LABEL = np.array([0.37, 0.1])
+LABEL_SIZE = np.array([0.37, 0.1])
 """Width and height of a default's name, in fractions of the panel."""
-CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.87, 17)])
+LABEL_PLACES = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.87, 17)])
 """Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
@@ -63,93 +63,97 @@ def draw(measured_points: MeasuredPoints) -> Figure:
     """Figure of error over force calls and over time, side by side. Failed settings are marked above the first
     panel."""
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 7.6), sharey=True)
-    styles = _styles(measured_points)
+    styles = _curve_styles(measured_points)
     top = 8 * max(measured_points.error(p) for p in measured_points.points if p.status == "ok")
     rounds = max(len(p.seconds) for p in measured_points.points)
     several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
     for ax, kind in zip(axes, measured_points.costs, strict=True):
-        _floor(ax, measured_points)
-        _front(ax, measured_points, kind)
+        _shade_floor(ax, measured_points)
+        _plot_front(ax, measured_points, kind)
         for curve, points in measured_points.curves().items():
-            _curve(ax, measured_points, points, kind, styles[curve])
+            _plot_curve(ax, measured_points, points, kind, styles[curve])
         timed = kind == "seconds"
         label = "time [s] of a run, model built anew (median)" if timed else f"{kind} in the run [-]"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        ax.set_title(wrapped(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * COLUMN_WIDTH, TITLE_TEXT))
-    _failures(axes[0], measured_points, top)
+        ax.set_title(
+            wrapped_text(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * COLUMN_WIDTH, TITLE_TEXT)
+        )
+    _mark_failures(axes[0], measured_points, top)
     axes[0].set_ylabel(f"error of the {measured_points.quantity} [{measured_points.unit}]")
     axes[0].set_ylim(0.3 * measured_points.uncertainty[measured_points.quantity], 15 * top)
     for ax, kind in zip(axes, measured_points.costs, strict=True):
-        _defaults(ax, measured_points, kind)
-    alike = "; ".join(named(group[0], [group]) for group in measured_points.same())
-    heading(figure, f"What accuracy costs: {measured_points.title}")
-    longest = max(map(len, map(named, styles)))
+        _mark_defaults(ax, measured_points, kind)
+    alike = "; ".join(curve_name(group[0], [group]) for group in measured_points.coinciding_curves())
+    add_heading(figure, f"What accuracy costs: {measured_points.title}")
+    longest = max(map(len, map(curve_name, styles)))
     figure.legend(
-        handles=_legend(measured_points, styles),
+        handles=_legend_handles(measured_points, styles),
         loc="outside lower center",
         ncols=4 if longest <= LONGEST_LABEL else 3,
         fontsize=SMALL_TEXT,
         handlelength=2.6,
         columnspacing=1.2,
-        title=wrapped(f"Same error at the same setting: {alike}.", 1.1 * COLUMN_WIDTH, SMALL_TEXT) if alike else None,
+        title=wrapped_text(f"Same error at the same setting: {alike}.", 1.1 * COLUMN_WIDTH, SMALL_TEXT)
+        if alike
+        else None,
         title_fontsize=SMALL_TEXT,
         alignment="left",
     )
     return figure
 
 
-def _styles(measured_points: MeasuredPoints) -> dict[str, Style]:
+def _curve_styles(measured_points: MeasuredPoints) -> dict[str, Style]:
     """Style of each curve: colour by engine, marker by method, line by declared order (solid from 4 up)."""
     styles: dict[str, Style] = {}
     for curve, (first, *_) in measured_points.curves().items():
-        setting, colour = first.setting, _colour(first, measured_points)
+        setting, colour = first.setting, _engine_colour(first, measured_points)
         used = {style["marker"] for style in styles.values() if style["color"] == colour}
-        marker = SHARED.get(setting.method) or next((m for m in MARKERS if m not in used), ".")
-        line, size = STYLES.get(setting.order, "-"), SIZES.get(setting.engine, 5)
+        marker = SHARED_MARKERS.get(setting.method) or next((m for m in OTHER_MARKERS if m not in used), ".")
+        line, size = ORDER_STYLES.get(setting.order, "-"), MARKER_SIZES.get(setting.engine, 5)
         styles[curve] = {"color": colour, "marker": marker, "linestyle": line, "markersize": size}
     return styles
 
 
-def _colour(point: Point, measured_points: MeasuredPoints) -> str:
+def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
     """Colour of the engine of a point; engines without a colour of their own get one of FAMILY_COLOURS."""
     engine = point.setting.engine
     others = [name for name in dict.fromkeys(p.setting.engine for p in measured_points.points) if name not in COLOURS]
     return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[others.index(engine) % len(FAMILY_COLOURS)]
 
 
-def _curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
+def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
     """Plot one curve. Points below the accuracy of the reference are hollow, and points timed once are small."""
     places = [(p.cost(kind), measured_points.error(p)) for p in points]
     ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     alike = defaultdict(list)
     for p, place in zip(points, places, strict=True):
-        alike[place[1] < measured_points.floor(), kind == "seconds" and p.changed is None].append(place)
+        alike[place[1] < measured_points.judging_floor(), kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
         face = "white" if hollow else style["color"]
         ax.plot(*zip(*some, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
     for p, place in zip(points, places, strict=True):
         if p.broken:
-            ax.plot(*place, **BROKEN)
+            ax.plot(*place, **BROKEN_STYLE)
 
 
-def _floor(ax: Axes, measured_points: MeasuredPoints) -> None:
+def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     """Shade the errors that are below the accuracy of the reference."""
     known = measured_points.uncertainty[measured_points.quantity]
-    for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.floor(), 0.25)):
+    for low, high, alpha in ((1e-30, known, 0.6), (known, measured_points.judging_floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
     told = f"reference known to {known:.1g} {measured_points.unit} (dark);\nbelow ten times that: hollow"
     ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
-def _front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _plot_front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
     """Plot the Pareto front, the settings that no other one beats, as a broad pale line behind the curves."""
     front = measured_points.front(kind)
     costs = [p.cost(kind) for p in front]
-    ax.plot(costs, list(map(measured_points.error, front)), **FRONT, solid_capstyle="round", zorder=1)
+    ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
-def _defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
     """Mark each engine's default setting with a ring, and write its name where the panel has most space."""
     taken, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
@@ -160,9 +164,9 @@ def _defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
         ax.plot(*place, "o", **ring, zorder=5)
         around = _fractions_of_panel(ax, [place])[0]
         corner = _emptiest_corner(taken, around, names)
-        names.append(corner + LABEL * np.array([0.5, 0.0]))
+        names.append(corner + LABEL_SIZE * np.array([0.5, 0.0]))
         way = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
-        taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
+        taken = np.vstack([taken, corner + LABEL_SIZE * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
             place,
@@ -191,34 +195,36 @@ def _line_points(ax: Axes) -> np.ndarray:
 
 
 def _emptiest_corner(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
-    """The corner of CORNERS at which a name covers no line; if several are free, the one near its setting.
+    """The corner of LABEL_PLACES at which a name covers no line; if several are free, the one near its setting.
 
     names : middles of names that stand already, through which no line to this one shall lead.
     """
-    middles = CORNERS + LABEL * np.array([0.5, 0.0])
-    apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL)
+    middles = LABEL_PLACES + LABEL_SIZE * np.array([0.5, 0.0])
+    apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL_SIZE)
     clear = np.minimum(apart.max(axis=2).min(axis=1), 1.8)
     far = np.hypot(*(middles - places).T)
     ways = places + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - places)
-    crossed = [(np.abs(ways - name) < 0.55 * LABEL).all(axis=2).any(axis=0) for name in names]
-    return np.asarray(CORNERS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
+    crossed = [(np.abs(ways - name) < 0.55 * LABEL_SIZE).all(axis=2).any(axis=0) for name in names]
+    return np.asarray(LABEL_PLACES[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
-def _failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
+def _mark_failures(ax: Axes, measured_points: MeasuredPoints, top: float) -> None:
     """Mark each failed setting with a cross at the number of force calls that it would have needed, and list the
     failures."""
     failed = [p for p in measured_points.points if p.status != "ok"]
     for p in failed:
-        if calls := _expected(p, measured_points):
-            size = 1.4 * SIZES.get(p.setting.engine, 5)
-            ax.plot(calls, top, "x", color=_colour(p, measured_points), markersize=size, markeredgewidth=1.6)
+        if calls := _expected_calls(p, measured_points):
+            size = 1.4 * MARKER_SIZES.get(p.setting.engine, 5)
+            ax.plot(calls, top, "x", color=_engine_colour(p, measured_points), markersize=size, markeredgewidth=1.6)
     if failed:
-        text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
-        text = wrapped(text, 0.42 * COLUMN_WIDTH, SMALL_TEXT)
+        text = "; ".join(
+            f"{status}: {_methods_text(failed, status)}" for status in dict.fromkeys(p.status for p in failed)
+        )
+        text = wrapped_text(text, 0.42 * COLUMN_WIDTH, SMALL_TEXT)
         ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL_TEXT)
 
 
-def _expected(p: Point, measured_points: MeasuredPoints) -> float:
+def _expected_calls(p: Point, measured_points: MeasuredPoints) -> float:
     """Force calls that a failed setting made, or would need by extrapolation from its curve; 0 if unknown."""
     work = measured_points.costs[0]
     if p.counts:
@@ -227,7 +233,7 @@ def _expected(p: Point, measured_points: MeasuredPoints) -> float:
     return 0.0 if first is None or p.setting.adaptive else first.cost(work) * first.setting.value / p.setting.value
 
 
-def _who(failed: list[Point], status: str) -> str:
+def _methods_text(failed: list[Point], status: str) -> str:
     """Text that names the methods with failed settings; methods without any answer are marked."""
     alike = [p for p in failed if p.status == status]
     if status == "flagged":
@@ -243,13 +249,13 @@ def _who(failed: list[Point], status: str) -> str:
     return ", ".join(parts)
 
 
-def _legend(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
+def _legend_handles(measured_points: MeasuredPoints, styles: dict[str, Style]) -> list[Line2D]:
     """Handles of the legend: the curves, then the other marks."""
-    names = sorted(styles, key=named)
-    handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
-    handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
+    names = sorted(styles, key=curve_name)
+    handles = [Line2D([], [], **styles[curve], label=curve_name(curve)) for curve in names]
+    handles.append(Line2D([], [], **FRONT_STYLE, label="no other setting is better (Pareto)"))
     for text in dict.fromkeys(text for p in measured_points.points for text in p.broken):
-        handles.append(Line2D([], [], **BROKEN, label=fill(f"assumption broken: {text}", LONGEST_LABEL)))
+        handles.append(Line2D([], [], **BROKEN_STYLE, label=fill(f"assumption broken: {text}", LONGEST_LABEL)))
     if any(p.status != "ok" for p in measured_points.points):
         failed = "no answer to rely on"
         handles.append(Line2D([], [], color=GREY, marker="x", linestyle="none", label=failed))

@@ -45,7 +45,7 @@ def _mujoco_calls(model: Any) -> int:
     return int(model.data.timer[mujoco.mjtTimer.mjTIMER_ACTUATION].number)
 
 
-def counted(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
+def counted_calls(engine: str, assembly: Assembly, settings: Settings) -> tuple[int, int]:
     """Force calls of one run in Exudyn or MuJoCo: as counted from outside, and as twinrig reports them."""
     if engine == "mujoco":
         model: Any = build(engine, assembly, settings)

@@ -19,11 +19,11 @@ from models.ensemble.runner import BLOCKS_AHEAD
 
 PATH_SECONDS, PATH_BYTES = 0.8 / 50, 0.4e6 / 50
 """A path of 60 s in a worker (s), and its states at 121 rows (bytes)."""
-FIXED, PER_BYTE = 12e-3, 2e-3 / 0.4e6
+COMMAND_TIMES, PER_BYTE = 12e-3, 2e-3 / 0.4e6
 """Processor time of command and scheduler for a block of any size (s), and for each byte of it."""
-LINK, DISK = 1.25e9, 500e6
+LINK_RATE, DISK_RATE = 1.25e9, 500e6
 """Bytes per second into the command, by 10 Gbit/s, and onto its disk: assumed."""
-SCATTER = 0.1
+TIME_SCATTER = 0.1
 """Standard deviation of a block's time, by its mean."""
 SEED = 25
 WORKERS = (2, 10, 100, 1000)
@@ -50,7 +50,11 @@ class Ensemble:
     @property
     def stations(self) -> dict[str, float]:
         """Time (s) that each station (command, link, disk), which serves one block at a time, needs for a block."""
-        return {"command": FIXED + PER_BYTE * self.bytes, "link": self.bytes / LINK, "disk": self.bytes / DISK}
+        return {
+            "command": COMMAND_TIMES + PER_BYTE * self.bytes,
+            "link": self.bytes / LINK_RATE,
+            "disk": self.bytes / DISK_RATE,
+        }
 
     @property
     def most_workers(self) -> float:
@@ -73,9 +77,9 @@ class WorkerShares:
         return max(shares, key=lambda name: shares[name])
 
 
-def simulated(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
+def simulated_shares(ensemble: Ensemble, workers: int, blocks: int) -> WorkerShares:
     """Simulate a run of ``blocks`` blocks by a number of workers, from sending the first block to saving the last."""
-    seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, SCATTER, blocks).clip(0.5, 1.5)
+    seconds = ensemble.seconds * np.random.default_rng(SEED).normal(1.0, TIME_SCATTER, blocks).clip(0.5, 1.5)
     half, waiting, free = ensemble.stations["command"] / 2.0, list[int](), workers
     idle, events, order = dict.fromkeys(("command", "link", "disk"), 0.0), list[tuple[float, int, str, int]](), count()
     kept, first, sent, now = set[int](), 0, 0, 0.0
@@ -125,7 +129,7 @@ def table(rounds: int = 20) -> Iterator[str]:
     """Rows of the table in the docs: share of time for which workers compute, and the busiest station with the most
     workers. rounds : number of blocks per worker."""
     for name, ensemble in SETTINGS.items():
-        outcomes = [simulated(ensemble, workers, rounds * workers) for workers in WORKERS]
+        outcomes = [simulated_shares(ensemble, workers, rounds * workers) for workers in WORKERS]
         shares = " | ".join(f"{100.0 * outcome.workers:.0f} %" for outcome in outcomes)
         sent = outcomes[-1].rate * ensemble.bytes / 1e6
         yield f"| {name} | {shares} | {outcomes[-1].bottleneck} | {sent:.0f} MB/s | {ensemble.most_workers:.0f} |"

@@ -34,7 +34,7 @@ from models.multibody.cut_kernel import (
     set_joint_forces,
 )
 from models.multibody.cut_table import HubInputs, table
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as pitch_plane_scene
 from models.vehicles.cut_vehicle import CutVehicle, Element
 from models.vehicles.description import Vehicle
@@ -47,7 +47,7 @@ Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Sides:
+class TwoBuilds:
     """A vehicle built twice: by its system's builder, and by the builder of free vehicles. ``sign`` : sign of the
     latter's coordinates relative to the former's."""
 
@@ -72,23 +72,23 @@ def ride_vehicle() -> SpatialVehicle:
     return replace(load_vehicle("r19_ride"), bars=())
 
 
-def ride(engine: str) -> Sides:
+def built_ride(engine: str) -> TwoBuilds:
     """The ride vehicle in an engine, built by both builders."""
     vehicle, settings = ride_vehicle(), Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
-    return Sides(in_space(engine, vehicle, settings), free_model(engine, driven(vehicle), settings))
+    return TwoBuilds(in_space(engine, vehicle, settings), free_model(engine, driven_vehicle(vehicle), settings))
 
 
-def pitch_plane(engine: str) -> Sides:
+def pitch_plane(engine: str) -> TwoBuilds:
     """The pitch-plane vehicle on its tyres in an engine, built by both builders. Its coordinates count downward, those
     of the free vehicle upward."""
     settings = Settings(INTEGRATORS[engine], STEP, STEPS * STEP)
     scene = pitch_plane_scene({"title": "free", "run": {"duration": STEPS * STEP, "step": STEP}})
-    assembly = replace(assemble(scene), mode="free", input=None, initial=np.zeros(8))
-    free = free_model(engine, driven(_raised(assembly.vehicle), assembly.vehicle.gravity), settings)
-    return Sides(in_plane(engine, assembly, settings), free, -1.0)
+    assembly = replace(assembly_of_scene(scene), mode="free", input=None, initial=np.zeros(8))
+    free = free_model(engine, driven_vehicle(_vehicle_in_space(assembly.vehicle), assembly.vehicle.gravity), settings)
+    return TwoBuilds(in_plane(engine, assembly, settings), free, -1.0)
 
 
-def _raised(plane: Vehicle) -> SpatialVehicle:
+def _vehicle_in_space(plane: Vehicle) -> SpatialVehicle:
     """A pitch-plane vehicle described as a vehicle in space."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
@@ -112,7 +112,7 @@ def _raised(plane: Vehicle) -> SpatialVehicle:
     return SpatialVehicle("pitch plane", bodies, springs, tyres, (0.0,))
 
 
-def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
+def driven_vehicle(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
     """A vehicle on a flat road for the builder of free vehicles, with all its forces compiled."""
     tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
     numbers = _force_table(tree, vehicle)
@@ -122,10 +122,10 @@ def driven(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
 def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     """Table of numbers for the compiled forces: all axes are fixed in space, and tyres act against the ground."""
     springs = [
-        _element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
+        _spring_element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
         for s in vehicle.springs
     ]
-    tyres = [_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
+    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
     whole = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
     numbers = table(whole, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = parts(numbers)[3], -1.0
@@ -135,7 +135,7 @@ def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
     return numbers
 
 
-def _element(
+def _spring_element(
     name: str, first: str, second: str, law: SpringDamper | Tyre, start: Vector, end: Vector, axis: Vector
 ) -> Element:
     places = (np.array(start, float), np.array(end, float), np.array(axis, float))
@@ -150,15 +150,15 @@ def one_tree() -> Iterator[None]:
         yield
 
 
-def ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
+def time_ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float, float]]:
     """Ratios of a run's processor time with another builder to that with the present one, each with its interval."""
     jobs, names = list[Callable[[], Any]](), list[str]()
     for engine in INTEGRATORS:
-        for system, sides in (("ride", ride(engine)), ("pitch plane", pitch_plane(engine))):
+        for system, sides in (("ride", built_ride(engine)), ("pitch plane", pitch_plane(engine))):
             jobs += [sides.system.run, sides.free.run]
             names.append(f"{system}, {engine}: the free builder to today's")
     with one_tree():
-        jobs += [ride("exudyn").system.run]
+        jobs += [built_ride("exudyn").system.run]
     seconds = interleave(jobs, rounds, minimum_seconds, clock=time.process_time)
     told = {name: paired_ratio(seconds[2 * i + 1], seconds[2 * i]) for i, name in enumerate(names)}
     return told | {"ride, exudyn: one tree, springs of today, to today's": paired_ratio(seconds[-1], seconds[0])}
@@ -166,7 +166,7 @@ def ratios(rounds: int, minimum_seconds: float) -> dict[str, tuple[float, float,
 
 if __name__ == "__main__":
     for each_engine in INTEGRATORS:
-        for each in (ride, pitch_plane):
+        for each in (built_ride, pitch_plane):
             print(f"{each.__name__}, {each_engine}: accelerations apart by {each(each_engine).gap(100):.1e}")
-    for each_name, (middle, low, high) in ratios(15, 0.1).items():
+    for each_name, (middle, low, high) in time_ratios(15, 0.1).items():
         print(f"{each_name}: {middle:.2f} ({low:.2f} to {high:.2f})")

@@ -16,11 +16,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from models.machine.timing import interleave
-from models.ride.covariance import stationary
-from models.ride.excited import excited
-from models.ride.frequency import quadrature, spectra
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
+from models.ride.frequency import spectral_densities, variances_by_quadrature
 from models.ride.monte_carlo import VarianceEstimate, at_constant_speed
-from models.ride.sweep import sweep
+from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
@@ -32,11 +32,11 @@ SYSTEM: System = "cost"
 SPEED, LOWEST = 20.0, 1e-2
 """m/s; first frequency of the grids, Hz."""
 SEED = 5
-SWEPT = 60
+SWEPT_SPEEDS = 60
 """Speeds of the sweep, in five cases of correlation each: its cost is that of one point."""
-GRIDS = {True: ((200, 100.0), (2000, 1000.0)), False: ((200, 100.0), (2000, 1000.0), (20_000, 10_000.0))}
+FREQUENCY_GRIDS = {True: ((200, 100.0), (2000, 1000.0)), False: ((200, 100.0), (2000, 1000.0), (20_000, 10_000.0))}
 """Frequencies, evenly spaced in their logarithm, and the last of them in Hz, by ``quick``."""
-UNIFORM = (500, 50.0)
+UNIFORM_GRID = (500, 50.0)
 COPIES = {True: ((16, 4.0),), False: ((2, 100.0), (20, 100.0), (100, 100.0))}
 """Copies and how long each runs (s)."""
 KINDS = {"accelerations": "acceleration", "tyre forces": "tyre force"}
@@ -83,23 +83,23 @@ def problem() -> PricedRide:
     """The priced problem: the vehicle R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
     roads = five_cases(vehicle.wheels)
-    true = quadrature(vehicle, roads["3"], SPEED)
+    true = variances_by_quadrature(vehicle, roads["3"], SPEED)
     return PricedRide(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 
 
-def direct(ride: PricedRide) -> np.ndarray:
+def direct_deviations(ride: PricedRide) -> np.ndarray:
     """Standard deviations by a Lyapunov equation."""
-    return stationary(excited(ride.vehicle, ride.road, SPEED)).deviation
+    return stationary_covariance(vehicle_with_road(ride.vehicle, ride.road, SPEED)).deviation
 
 
-def fast(ride: PricedRide, count: int) -> np.ndarray:
+def swept_deviations(ride: PricedRide, count: int) -> np.ndarray:
     """Standard deviations at SPEED, from a sweep by eigenvectors over five cases of correlation and ``count``
     speeds."""
     speeds = [*np.linspace(5.0, 50.0, count - 1), SPEED]
-    return sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
+    return variance_sweep(lambda speed: ride.vehicle, ride.roads, speeds).deviation[list(ride.roads).index("3"), -1]
 
 
-def grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = False) -> np.ndarray:
+def deviations_on_grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = False) -> np.ndarray:
     """Standard deviations by the trapezoidal rule on a frequency grid up to ``highest_frequency`` (Hz), evenly spaced
     in frequency or in its logarithm."""
     frequency = (
@@ -108,21 +108,21 @@ def grid(ride: PricedRide, count: int, highest_frequency: float, even: bool = Fa
         else np.geomspace(LOWEST, highest_frequency, count)
     )
     omega = 2 * np.pi * frequency
-    return np.sqrt(2 * np.trapezoid(spectra(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
+    return np.sqrt(2 * np.trapezoid(spectral_densities(ride.vehicle, ride.road, SPEED, omega), omega, axis=0))
 
 
 def measure(quick: bool, rounds: int, minimum_seconds: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data of all routes; counts and errors are judged, times are not."""
     ride = problem()
-    swept = 3 if quick else SWEPT
-    points = [_lyapunov(ride), _route_point_of_sweep(ride, swept)]
-    jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
-    for count, last, even in (*((*net, False) for net in GRIDS[quick]), (*UNIFORM, True)):
+    swept = 3 if quick else SWEPT_SPEEDS
+    points = [_lyapunov_point(ride), _route_point_of_sweep(ride, swept)]
+    jobs: list[Callable[[], Any]] = [partial(direct_deviations, ride), partial(swept_deviations, ride, swept)]
+    for count, last, even in (*((*net, False) for net in FREQUENCY_GRIDS[quick]), (*UNIFORM_GRID, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
         begun = time.perf_counter()
-        errors = ride.errors(grid(ride, count, last, even))
+        errors = ride.errors(deviations_on_grid(ride, count, last, even))
         points.append(RoutePoint(name, "frequencies", count, errors, time.perf_counter() - begun))
-        jobs.append(partial(grid, ride, count, last, even))
+        jobs.append(partial(deviations_on_grid, ride, count, last, even))
     for copies, lasting in COPIES[quick]:
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
         begun = time.perf_counter()
@@ -134,14 +134,14 @@ def measure(quick: bool, rounds: int, minimum_seconds: float) -> tuple[list[Row]
     for i, times in zip(few, interleave([jobs[i] for i in few], rounds, minimum_seconds), strict=True):
         points[i] = replace(points[i], seconds=float(np.median(times)))
     points[1] = replace(points[1], seconds=points[1].seconds / (5 * swept))  # of the sweep a point
-    return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
+    return judging_rows(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
 
-def _lyapunov(ride: PricedRide) -> RoutePoint:
+def _lyapunov_point(ride: PricedRide) -> RoutePoint:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
-        deviations = direct(ride)
+        deviations = direct_deviations(ride)
     return RoutePoint("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
@@ -149,13 +149,13 @@ def _route_point_of_sweep(ride: PricedRide, speeds: int) -> RoutePoint:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes", wraps=module.modes) as made:
-        deviations = fast(ride, speeds)
+        deviations = swept_deviations(ride, speeds)
     return RoutePoint(
         f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(deviations), 0.0
     )
 
 
-def judged(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
+def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
     """Rows that judge errors and counts of the routes."""
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]
@@ -241,7 +241,7 @@ def table(data: dict[str, Any]) -> Table:
 
 def draw(data: dict[str, Any]) -> tuple[str, Figure]:
     """Plot error over computing time (ms), with a panel per kind of output."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, legend_below, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
@@ -254,6 +254,6 @@ def draw(data: dict[str, Any]) -> tuple[str, Figure]:
         ax.set_ylim(1e-16, 1.0)
     axes[0].set_ylabel("largest relative error\nof a standard deviation [-]")
     legend_below(figure, axes[0], columns=2)
-    heading(figure, f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
+    add_heading(figure, f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
     caption = "Standard deviations by every route against quadrature with the delay exact (grey: its own error)."
     return caption, figure

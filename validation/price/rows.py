@@ -2,19 +2,19 @@
 
 from models.advice.price.curves import ToleranceCost
 from models.advice.price.problem import Problem, Setting
-from models.advice.price.runner import MeasuredPoints, Point, attempt, cheapest
+from models.advice.price.runner import MeasuredPoints, Point, attempt, cheapest_curve
 from validation.common.rows import Observed, Row, System
-from validation.price.tables import named
+from validation.price.tables import curve_name
 
 SYSTEM: System = "cost"
-BANDS = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
+ORDER_TOLERANCE = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
 """Allowed distance of the observed from the declared order: at these steps the next power still shows,
 the more the higher the order (RK4 between 1 and 0.25 ms: 4.17)."""
 REFERENCE_SHARE = 1e-4
 """Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``sure`` of its own."""
 SETTLED_RATIO = 0.9
 """Of the last but one error: a curve that falls no further has come down to its theory's own."""
-PROMISE = 1.25
+INTERPOLATION_FACTOR = 1.25
 """Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
 
 
@@ -22,8 +22,8 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
     """All rows of one problem; the row on the width of the sweep is part of the full run only."""
     points, repeated = measured_points.points, [p for p in measured_points.points if p.changed is not None]
     return [
-        _reference(problem, measured_points),
-        *_orders(measured_points),
+        _reference_row(problem, measured_points),
+        *_order_rows(measured_points),
         _none_of(
             f"price.{problem.key}.silent",
             f"wrong answers without a word, of {len(points)} settings",
@@ -34,7 +34,7 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
         _none_of(
             f"price.{problem.key}.counts.said",
             "settings whose force calls are not stages times steps",
-            measured_points.miscounted(),
+            measured_points.miscounted_methods(),
             "exact: stages from the methods' tableaux",
         ),
         _none_of(
@@ -44,8 +44,8 @@ def rows_of(problem: Problem, measured_points: MeasuredPoints, quick: bool) -> l
             "exact: all counts, and errors to the last digit",
         ),
         _rows_of_promises(problem, measured_points),
-        *([] if quick else [_sweep(measured_points)]),
-        *_losses(measured_points),
+        *([] if quick else [_sweep_row(measured_points)]),
+        *_loss_rows(measured_points),
     ]
 
 
@@ -59,7 +59,7 @@ def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
     return Observed(name, SYSTEM, what + offenders, len(those), "settings").within(0, 0, why, "closed form")
 
 
-def _reference(problem: Problem, measured_points: MeasuredPoints) -> Row:
+def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
     """Row: the reference is more accurate than the finest tolerance requires."""
     quantity, share = measured_points.quantity, getattr(problem, "sure", REFERENCE_SHARE)
     return Observed(
@@ -76,25 +76,25 @@ def _reference(problem: Problem, measured_points: MeasuredPoints) -> Row:
     )
 
 
-def _orders(measured_points: MeasuredPoints) -> list[Row]:
+def _order_rows(measured_points: MeasuredPoints) -> list[Row]:
     """Rows: observed order of every fixed-step method with a declared order, for each quantity."""
     settings = {p.setting.curve: p.setting for p in measured_points.points}
     return [
         Observed(
             f"price.{measured_points.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
-            f"observed order of the largest error of the {quantity}, {named(curve)}",
+            f"observed order of the largest error of the {quantity}, {curve_name(curve)}",
             order,
             "",
         ).within(
             setting.order,
-            BANDS[setting.order],
+            ORDER_TOLERANCE[setting.order],
             "slope on the three finest steps that stand clear of the reference; the next power of "
             "the step still shows in it",
             "closed form",
         )
         for quantity in measured_points.units
-        for curve, order in measured_points.orders(quantity).items()
+        for curve, order in measured_points.observed_orders(quantity).items()
         if (setting := settings[curve]).order and not setting.adaptive
     ]
 
@@ -103,7 +103,7 @@ def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
     """Row: the settings in the table of cheapest settings are run, and must keep their tolerances."""
     worst = 0.0
     for target in problem.tolerances:
-        best = cheapest(measured_points.reaches(target, measured_points.costs[0]))
+        best = cheapest_curve(measured_points.reaches(target, measured_points.costs[0]))
         if best is not None:
             point = attempt(problem, _runnable_setting(problem, measured_points, *best))
             worst = max(worst, point.errors.get(measured_points.quantity, float("inf")) / target)
@@ -115,7 +115,7 @@ def _rows_of_promises(problem: Problem, measured_points: MeasuredPoints) -> Row:
         "",
     ).within(
         0.0,
-        PROMISE,
+        INTERPOLATION_FACTOR,
         "interpolated between two settings tried: a quarter is how far a curve may bend between them",
         "closed form",
     )
@@ -128,7 +128,7 @@ def _runnable_setting(problem: Problem, measured_points: MeasuredPoints, curve: 
     return problem.setting(like.engine, like.method, value)
 
 
-def _sweep(measured_points: MeasuredPoints) -> Row:
+def _sweep_row(measured_points: MeasuredPoints) -> Row:
     """Row: each method was tried widely enough, with at least six settings. From order 4 up they span four decades of
     the setting or the error, unless the curve ends at a failure or at its smallest error."""
     tried, short = measured_points.curves(None), []
@@ -148,7 +148,7 @@ def _sweep(measured_points: MeasuredPoints) -> Row:
     return _none_of(f"price.{measured_points.key}.sweep", what, short, "what the study was asked to cover")
 
 
-def _losses(measured_points: MeasuredPoints) -> list[Row]:
+def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
     """Rows: loss of each engine's default setting relative to the cheapest one, at the middle tolerance."""
     return [
         row
@@ -156,11 +156,11 @@ def _losses(measured_points: MeasuredPoints) -> list[Row]:
         if p.status == "ok"
         for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
         for kind in measured_points.costs
-        for row in _loss(measured_points, owner, among, words, kind)
+        for row in _rows_of_loss(measured_points, owner, among, words, kind)
     ]
 
 
-def _loss(measured_points: MeasuredPoints, owner: str, engine: str, words: str, kind: str) -> list[Row]:
+def _rows_of_loss(measured_points: MeasuredPoints, owner: str, engine: str, words: str, kind: str) -> list[Row]:
     target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner]
     lost = measured_points.loss(target, kind, p.setting.curve, engine)
     if lost is None:

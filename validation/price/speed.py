@@ -9,7 +9,7 @@ import numpy as np
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.machine.timing import describe, interleave, median, paired_ratio
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.compiled_forces import CompiledForces
 
@@ -26,7 +26,7 @@ def callback_cost(
     Values are (ratio, low, high) with a bootstrap 95 % interval, and medians in s. ``gap`` is the largest
     difference of states between the native route and the one with every force in the callback.
     """
-    flat = assemble(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
+    flat = assembly_of_scene(build_scene({"title": "no input", "run": {"duration": duration, "step": STEP}}))
     bare = replace(flat, vehicle=replace(flat.vehicle, struts=()))
     settings = Settings(integrator, STEP, duration)
     models = [build("mujoco", assembly, settings) for assembly in (bare, flat, driven)]

@@ -23,7 +23,7 @@ from models.engines.reference import derivative_of
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import Observed, Row, Saved, System, Table
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches
@@ -36,18 +36,18 @@ STEPS = {"road": 1000, "wheel-20": 400}
 """Steps of a run, by the problem's key."""
 STEP = {"road": 1e-3, "wheel-20": 2.5e-4}
 """s"""
-DAMPER = 1e-3
+WEAK_DAMPING = 1e-3
 """N s/m of the cheap law, which moves next to nothing."""
 METHODS = {"exudyn": "RK44", "mujoco": "RK4"}
 Of = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
-def damper(numbers, t, q, v, f):
+def add_weak_damper(numbers, t, q, v, f):
     """Add a weak damper's forces on four coordinates to ``f``; all but the time are pointers to doubles."""
     rate, force = carray(v, (4,)), carray(f, (4,))
     for i in range(4):
-        force[i] -= DAMPER * rate[i]
+        force[i] -= WEAK_DAMPING * rate[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,13 +55,13 @@ def handed_damper(block, t, n):
     """Compute the damper's forces in one block of doubles at an address: f, q and v, (n,) each."""
     f = at(block)
     carray(f, (n,))[:] = 0.0
-    damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
+    add_weak_damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 ZEROS = [0.0] * 4
 
 
-def nothing(positions: Any, rates: Any) -> Any:
+def zero_forces(positions: Any, rates: Any) -> Any:
     """Force function that returns zero forces at every state."""
     return ZEROS
 
@@ -71,7 +71,7 @@ Runs = list[Callable[[], Any]]
 
 def _road_exudyn() -> Runs:
     """Exudyn's model of the vehicle on a flat road, whose forces the reference's own right-hand side computes."""
-    assembly = assemble(road_excited.scene())
+    assembly = assembly_of_scene(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
     derivative, scale = derivative_of("road", assembly.vehicle.geometry), np.array(masses)
@@ -82,15 +82,16 @@ def _road_exudyn() -> Runs:
 
     return [
         partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"])
-        for law in (nothing, listed(4, np.zeros(0), handed_damper), of)
+        for law in (zero_forces, listed(4, np.zeros(0), handed_damper), of)
     ]
 
 
 def _road_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
-    compiled = CompiledForces(assemble(road_excited.scene()), settings)
+    compiled = CompiledForces(assembly_of_scene(road_excited.scene()), settings)
     return [
-        partial(_run_with_callback, counted, compiled.coast) for counted in (empty_law(), kernel_law(damper), law())
+        partial(_run_with_callback, counted, compiled.coast)
+        for counted in (empty_law(), kernel_law(add_weak_damper), law())
     ]
 
 
@@ -98,7 +99,7 @@ def _wheel_exudyn() -> Runs:
     wheels, steps, step = _wheels()
     return [
         partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for of in (nothing, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
+        for of in (zero_forces, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
     ]
 
 
@@ -107,7 +108,7 @@ def _wheel_mujoco() -> Runs:
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
         partial(_run_with_callback, law, partial(marcher.run, start, steps))
-        for law in (empty_law(), kernel_law(damper), kernel_law(forces))
+        for law in (empty_law(), kernel_law(add_weak_damper), kernel_law(forces))
     ]
 
 
@@ -120,7 +121,7 @@ def _run_with_callback(callback: Any, run: Callable[[], Any]) -> None:
         run()
 
 
-MARCHES = {
+MARCHES_OF_PROBLEM = {
     ("road", "exudyn"): _road_exudyn,
     ("road", "mujoco"): _road_mujoco,
     ("wheel-20", "exudyn"): _wheel_exudyn,
@@ -131,20 +132,22 @@ MARCHES = {
 
 def measure(rounds: int, minimum_seconds: float) -> list[Saved]:
     """Times (s) of the three runs (empty, cheap and real forces) in every round, by problem and engine."""
-    seconds = interleave([job for make in MARCHES.values() for job in make()], rounds, minimum_seconds)
+    seconds = interleave([job for make in MARCHES_OF_PROBLEM.values() for job in make()], rounds, minimum_seconds)
     return [
         {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
-        for (problem, engine), rows in zip(MARCHES, seconds.reshape(len(MARCHES), 3, -1), strict=True)
+        for (problem, engine), rows in zip(
+            MARCHES_OF_PROBLEM, seconds.reshape(len(MARCHES_OF_PROBLEM), 3, -1), strict=True
+        )
     ]
 
 
-def parts(saved: Saved) -> np.ndarray:
+def step_parts(saved: Saved) -> np.ndarray:
     """Time per step in microseconds of engine, bridge and kernel (3,), from the medians of the rounds."""
     empty, cheap, real = (1e6 * float(np.median(saved["seconds"][run])) / STEPS[saved["problem"]] for run in RUNS)
     return np.array([empty, cheap - empty, real - cheap])
 
 
-def share(saved: Saved) -> tuple[float, float, float]:
+def bridge_share(saved: Saved) -> tuple[float, float, float]:
     """Share of the bridge in the time of a step, in % with its 95 % interval, from medians over resampled rounds."""
     empty, cheap, real = (np.array(saved["seconds"][run]) for run in RUNS)
     return median(100.0 * (cheap - empty) / real)
@@ -156,16 +159,16 @@ def rows(data: list[Saved]) -> list[Row]:
         Observed(
             f"price.{saved['problem']}.split.{saved['engine']}",
             SYSTEM,
-            f"share of the bridge in a step, {_named(saved)}, {saved['problem']}",
+            f"share of the bridge in a step, {_engine_text(saved)}, {saved['problem']}",
             middle,
             "%",
         ).beside(f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated", "none")
         for saved in data
-        for middle, low, high in [share(saved)]
+        for middle, low, high in [bridge_share(saved)]
     ]
 
 
-def _named(saved: Saved) -> str:
+def _engine_text(saved: Saved) -> str:
     return f"{LABELS[saved['engine']]} {METHODS[saved['engine']]}"
 
 
@@ -174,9 +177,11 @@ def table(data: list[Saved], problem: str) -> list[Table]:
     lines = []
     for saved in data:
         if saved["problem"] == problem:
-            _, low, high = share(saved)
-            values = (f"{value:.2f}" for value in parts(saved))
-            lines.append((_named(saved), str(STAGES[METHODS[saved["engine"]]]), *values, f"{low:.0f} to {high:.0f}"))
+            _, low, high = bridge_share(saved)
+            values = (f"{value:.2f}" for value in step_parts(saved))
+            lines.append(
+                (_engine_text(saved), str(STAGES[METHODS[saved["engine"]]]), *values, f"{low:.0f} to {high:.0f}")
+            )
     note = (
         f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
         "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "

@@ -7,35 +7,37 @@ from dataclasses import replace
 import numpy as np
 
 from models.advice.price import runner
-from models.advice.price.curves import HOLLOW, ToleranceCost
-from models.advice.price.runner import Loss, MeasuredPoints, Point, Reaches
+from models.advice.price.curves import UNCERTAINTY_FACTOR, ToleranceCost
+from models.advice.price.runner import CostsAtTolerance, Loss, MeasuredPoints, Point
 from models.drawing.figures import LABELS
 from models.machine.timing import describe
 from validation.common.rows import Table
 
-STATUSES = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
+STATUS_WORDS = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
 
 
 def tables(measured_points: MeasuredPoints) -> list[Table]:
     """All tables of one problem from its saved data."""
-    return [make(measured_points) for make in (cheapest, losses, every_curve, outcomes, failures)]
+    return [make(measured_points) for make in (cheapest_table, loss_table, every_curve, outcome_table, failure_table)]
 
 
-def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
+def curve_name(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
     """Name of a curve for readers, followed by the names of curves that coincide with it."""
     alike = next((group for group in groups or [] if curve in group), (curve,))
-    return " = ".join(map(_plain, sorted(alike, key=lambda other: other != curve)))
+    return " = ".join(map(_plain_name, sorted(alike, key=lambda other: other != curve)))
 
 
-def _plain(curve: str) -> str:
+def _plain_name(curve: str) -> str:
     engine, _, method = curve.partition(" ")
     return f"{LABELS[engine]} {method}"
 
 
-def cheapest(measured_points: MeasuredPoints) -> Table:
+def cheapest_table(measured_points: MeasuredPoints) -> Table:
     """Table of the cheapest setting that keeps each tolerance."""
-    work, groups = measured_points.costs[0], measured_points.same()
-    rivals = [engine for engine in runner.RIVALS if any(p.setting.engine == engine for p in measured_points.points)]
+    work, groups = measured_points.costs[0], measured_points.coinciding_curves()
+    rivals = [
+        engine for engine in runner.COMPARED_ENGINES if any(p.setting.engine == engine for p in measured_points.points)
+    ]
     rows = []
     for target in measured_points.tolerances:
         calls, seconds = (measured_points.reaches(target, kind) for kind in measured_points.costs)
@@ -76,25 +78,25 @@ def rounds_of(points: list[Point]) -> str:
 
 def _text_of_winner(
     measured_points: MeasuredPoints,
-    reaches: Reaches,
+    reaches: CostsAtTolerance,
     engine: str,
     unit: str,
     groups: list[tuple[str, ...]] | None = None,
 ) -> str:
-    best = runner.cheapest(reaches, engine)
+    best = runner.cheapest_curve(reaches, engine)
     if best is None:
         return "none of those tried"
     curve, least = best
-    label = replace(measured_points.curves()[curve][0].setting, value=least.value).label() + _coarsest(least)
+    label = replace(measured_points.curves()[curve][0].setting, value=least.value).label() + _coarsest_text(least)
     paid = f"{1e3 * least.cost:.3g} ms" if unit == "ms" else f"{least.cost:,.0f} {unit}"
-    return f"{named(curve, groups)}, {label}: {paid}"
+    return f"{curve_name(curve, groups)}, {label}: {paid}"
 
 
-def _coarsest(cheapest_reach: ToleranceCost) -> str:
+def _coarsest_text(cheapest_reach: ToleranceCost) -> str:
     return " (coarsest)" if cheapest_reach.how == "coarsest" else ""
 
 
-def losses(measured_points: MeasuredPoints) -> Table:
+def loss_table(measured_points: MeasuredPoints) -> Table:
     """Table of the cost of each engine's default method divided by the cheapest's, for the same error."""
     owners = measured_points.defaults
     rows = tuple(
@@ -120,7 +122,7 @@ def losses(measured_points: MeasuredPoints) -> Table:
         + (
             f"gives {measured_points.error(usual):.3g} {measured_points.unit}"
             if usual.status == "ok"
-            else f"is {STATUSES[usual.status]}"
+            else f"is {STATUS_WORDS[usual.status]}"
         )
         for owner, usual in owners.items()
     )
@@ -147,14 +149,14 @@ def _text_of_loss(loss: Loss | None) -> str:
 def every_curve(measured_points: MeasuredPoints) -> Table:
     """Table with a row per curve: settings, errors, observed order, and cost extrapolated to an error of 1."""
     groups, orders, work = (
-        measured_points.same(),
-        measured_points.orders(measured_points.quantity),
+        measured_points.coinciding_curves(),
+        measured_points.observed_orders(measured_points.quantity),
         measured_points.costs[0],
     )
     calls, seconds = (measured_points.reaches(measured_points.middle, kind) for kind in measured_points.costs)
     rows = tuple(
         (
-            _plain(curve),
+            _plain_name(curve),
             str(len(points)),
             f"{points[0].setting.label()} to {points[-1].setting.label()}",
             f"{measured_points.error(points[0]):.2g} to {measured_points.error(points[-1]):.2g}",
@@ -162,12 +164,13 @@ def every_curve(measured_points: MeasuredPoints) -> Table:
             str(points[0].setting.order or "varies"),
             _cost_text(calls.get(curve), 1, ",.0f"),
             _mark_of_single_runs(points, seconds.get(curve)) + _cost_text(seconds.get(curve), 1e3, ".3g"),
-            named(curve, groups).partition(" = ")[2] or "-",
+            curve_name(curve, groups).partition(" = ")[2] or "-",
         )
         for curve, points in measured_points.curves().items()
     )
     note = (
-        f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
+        "Order: slope of the error over the step on the three finest settings whose error exceeds "
+        f"{UNCERTAINTY_FACTOR:g} "
         "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
         "are still ruled by stability. Curves coincide if their errors agree to 1 % at every common "
         "setting. ~: seconds of one run."
@@ -190,36 +193,41 @@ def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | No
     """The mark "~" if a result depends on a setting that was timed only once, else ""."""
     return (
         "~"
-        if cheapest_reach is not None and any(p.changed is None for p in runner.resting(points, cheapest_reach))
+        if cheapest_reach is not None
+        and any(p.changed is None for p in runner.bracketing_points(points, cheapest_reach))
         else ""
     )
 
 
 def _cost_text(cheapest_reach: ToleranceCost | None, scale: float, form: str) -> str:
     return (
-        "not met" if cheapest_reach is None else format(scale * cheapest_reach.cost, form) + _coarsest(cheapest_reach)
+        "not met"
+        if cheapest_reach is None
+        else format(scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
     )
 
 
-def outcomes(measured_points: MeasuredPoints) -> Table:
+def outcome_table(measured_points: MeasuredPoints) -> Table:
     """Table of how many settings of each engine ended in which way."""
     ended = Counter((p.setting.engine, status) for p in measured_points.points for status in ("", p.status))
     engines = dict.fromkeys(p.setting.engine for p in measured_points.points)
-    rows = tuple((LABELS[engine], *(str(ended[engine, status]) for status in ("", *STATUSES))) for engine in engines)
+    rows = tuple(
+        (LABELS[engine], *(str(ended[engine, status]) for status in ("", *STATUS_WORDS))) for engine in engines
+    )
     note = (
         "Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
         "an answer came with a doubt; silent: a wrong answer that came back as a result, of which there must be "
         "none."
     )
-    return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
+    return Table("Settings by how they ended", note, ("engine", "settings", *STATUS_WORDS.values()), rows)
 
 
-def failures(measured_points: MeasuredPoints) -> Table:
+def failure_table(measured_points: MeasuredPoints) -> Table:
     """Table of the settings without a reliable answer, with their messages."""
     labels_of = defaultdict(list)
     for p in measured_points.points:
         if p.status != "ok":
-            labels_of[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
+            labels_of[_plain_name(p.setting.curve), STATUS_WORDS[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in labels_of.items())
     return Table(
         "Settings that gave no answer to rely on",

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from models.ensemble.runner import Blocks, run_paths
-from models.ensemble.workers import cluster, processes
+from models.ensemble.workers import dask_workers, process_pool
 from models.machine.timing import interleave, median, paired_ratio
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run
@@ -32,11 +32,11 @@ from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import force_scene, road_scene
 
 ROUNDS = 9
-PATHS, CUT = 400, Blocks(25)
+PATHS_PER_TURN, BLOCKS_OF_TURN = 400, Blocks(25)
 """Paths of a turn and their blocks: about 3 s by two workers, and 8 blocks each."""
-SIZES = (1_000, 50_000, 500_000)
+NUMBERS_SENT = (1_000, 50_000, 500_000)
 """Numbers that a block sends back, where its cost is told."""
-EMPTY = 100
+EMPTY_BLOCKS = 100
 """Blocks that do nothing but send."""
 
 
@@ -48,16 +48,16 @@ def ensemble_job(duration: float = 60.0) -> Any:
         return noise_paths(scene, np.linspace(0.0, duration, 121))
 
 
-def stretch(job: Any, numbers: list[int]) -> None:
+def compute_blocks(job: Any, numbers: list[int]) -> None:
     """Compute some blocks of an ensemble one after the other in a single process."""
     for number in numbers:
-        job(CUT.block(number, PATHS))
+        job(BLOCKS_OF_TURN.block(number, PATHS_PER_TURN))
 
 
-def lone(pools: list[Executor], job: Any) -> None:
+def compute_in_two_processes(pools: list[Executor], job: Any) -> None:
     """Compute an ensemble in two separate processes, each of which computes half of the blocks."""
-    count = CUT.count(PATHS)
-    wait([pool.submit(stretch, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
+    count = BLOCKS_OF_TURN.count(PATHS_PER_TURN)
+    wait([pool.submit(compute_blocks, job, list(range(i, count, 2))) for i, pool in enumerate(pools)])
 
 
 @dataclass(frozen=True)
@@ -78,36 +78,38 @@ class Sender:
 def cost_of_blocks(executor: Executor) -> dict[int, float]:
     """Processor time (s) of this process for a block, as a function of the numbers that the block sends back."""
     costs = {}
-    for numbers in SIZES:
+    for numbers in NUMBERS_SENT:
         run_paths(Sender(numbers), 4, executor=executor, blocks=Blocks(1))
         begun = time.process_time()
-        run_paths(Sender(numbers), EMPTY, executor=executor, blocks=Blocks(1))
-        costs[numbers] = (time.process_time() - begun) / EMPTY
+        run_paths(Sender(numbers), EMPTY_BLOCKS, executor=executor, blocks=Blocks(1))
+        costs[numbers] = (time.process_time() - begun) / EMPTY_BLOCKS
     return costs
 
 
 @contextmanager
-def crews() -> Iterator[dict[str, Executor]]:
+def worker_pools() -> Iterator[dict[str, Executor]]:
     """Context with crews of two workers: on this machine and, if it is installed, in a local Dask cluster."""
     with ExitStack() as stack:
-        pools: dict[str, Executor] = {"processes": stack.enter_context(processes(2))}
+        pools: dict[str, Executor] = {"processes": stack.enter_context(process_pool(2))}
         with suppress(ImportError):
             from distributed import LocalCluster
 
             here = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
             local = stack.enter_context(here)
-            pools["Dask"] = stack.enter_context(cluster(local.scheduler_address))
+            pools["Dask"] = stack.enter_context(dask_workers(local.scheduler_address))
         yield pools
 
 
-def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
+def measured_pools(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]:
     """Measurement of each crew: ``efficiency`` relative to two separate processes and ``seconds`` of a run, both with
     intervals; ``cost`` of a block (s)."""
     job = ensemble_job() if job is None else job
-    with ExitStack() as stack, crews() as pools:
-        alone: list[Executor] = [stack.enter_context(processes(1)) for _ in range(2)]
-        turns: list[Callable[[], Any]] = [partial(lone, alone, job)]
-        turns += [partial(run_paths, job, PATHS, executor=pool, blocks=CUT) for pool in pools.values()]
+    with ExitStack() as stack, worker_pools() as pools:
+        alone: list[Executor] = [stack.enter_context(process_pool(1)) for _ in range(2)]
+        turns: list[Callable[[], Any]] = [partial(compute_in_two_processes, alone, job)]
+        turns += [
+            partial(run_paths, job, PATHS_PER_TURN, executor=pool, blocks=BLOCKS_OF_TURN) for pool in pools.values()
+        ]
         seconds = interleave(turns, rounds)
         return {
             name: {
@@ -119,7 +121,7 @@ def measured(rounds: int = ROUNDS, job: Any = None) -> dict[str, dict[str, Any]]
         }
 
 
-def lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
+def measurement_lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
     """Text of the measurement."""
     answer = []
     for name, crew in measurement.items():
@@ -136,4 +138,4 @@ def lines(measurement: dict[str, dict[str, Any]]) -> list[str]:
 
 if __name__ == "__main__":
     print(f"{os.cpu_count()} cores; load before: {os.getloadavg()[0]:.2f}")
-    print("\n".join(lines(measured(int(sys.argv[1]) if sys.argv[1:] else ROUNDS))))
+    print("\n".join(measurement_lines(measured_pools(int(sys.argv[1]) if sys.argv[1:] else ROUNDS))))

@@ -21,7 +21,7 @@ from models.advice.price.recommendation import (
     SLOWER_RATIO,
     Recommendation,
     SettingChoice,
-    priced,
+    priced_scene,
     recommend,
 )
 from models.advice.price.search import TriedSetting
@@ -40,9 +40,16 @@ COARSE_SPACING, FINE_SPACING = 5e-5, 2e-5
 """Spacing (s) of the verdict's truth."""
 ROUNDS = 9, 25
 """Interleaved rounds of a contest, and of the one that must say the same again; turns are as long as in the race."""
-CONTEST = 3.0
+CONTEST_RATIO = 3.0
 """A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
-SCALES = {"f1,f2": 1e3, "pitch": 1e-2, "z3": 1e-2, "f3,f4": 1e3, "suspension_moment": 1e3, "enforced_moment": 1e3}
+QUANTITY_SCALES = {
+    "f1,f2": 1e3,
+    "pitch": 1e-2,
+    "z3": 1e-2,
+    "f3,f4": 1e3,
+    "suspension_moment": 1e3,
+    "enforced_moment": 1e3,
+}
 """Usual size of a quantity, of which tolerances are parts."""
 TOLERANCE_POWERS = (-5.0, -1.5)
 """Tolerances by that size, powers of ten."""
@@ -93,7 +100,7 @@ class Verdict:
 def drawn(number: int, folder: Path) -> DrawnScene:
     """The random scene with this number; its files are written to ``folder``."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
-    kind = KINDS[number % len(KINDS)]
+    kind = SCENE_KINDS[number % len(SCENE_KINDS)]
     name, effects, more = kind(rng, folder, number)
     override = {
         key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
@@ -109,7 +116,9 @@ def drawn(number: int, folder: Path) -> DrawnScene:
     quantity, common = "enforced_moment", ["pitch", "z3", "f3,f4"]
     if "prescribed_pitch" not in effects:
         quantity = str(rng.choice(common if "wheel_forces" in effects else ["f1,f2", *common]))
-    return DrawnScene(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS))
+    return DrawnScene(
+        build(table, "", folder), quantity, QUANTITY_SCALES[quantity] * 10.0 ** rng.uniform(*TOLERANCE_POWERS)
+    )
 
 
 Random = np.random.Generator
@@ -132,7 +141,7 @@ def _study_road(rng: Random, folder: Path, number: int) -> Kind:
     return f"{source} road", {"road": {"source": source, "speed": float(round(rng.uniform(5.0, 35.0), 1))}}, {}
 
 
-def _release(rng: Random, folder: Path, number: int) -> Kind:
+def _random_release(rng: Random, folder: Path, number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
     drawn = {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()}
     return "release", {}, {"start": drawn, "duration": float(rng.choice([0.2, 0.4, 2.5]))}
@@ -144,7 +153,7 @@ def _forces(rng: Random, folder: Path, number: int) -> Kind:
     return f"{how} forces", {"wheel_forces": {"file": file, "interpolation": how}}, {"duration": 0.2}
 
 
-def _guided(rng: Random, folder: Path, number: int) -> Kind:
+def _random_guided(rng: Random, folder: Path, number: int) -> Kind:
     file, pitch = _write_wheel_forces(rng, folder, number, 5e-3), f"pitch{number}.csv"
     times = 5e-3 * np.arange(101)
     wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
@@ -153,16 +162,16 @@ def _guided(rng: Random, folder: Path, number: int) -> Kind:
     return "prescribed pitch", effects, {"duration": 0.2}
 
 
-KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
+SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
     _iso_road,
     _forces,
-    _release,
+    _random_release,
     _iso_road,
-    _guided,
+    _random_guided,
     _study_road,
     _forces,
     _iso_road,
-    _release,
+    _random_release,
     _forces,
 )
 
@@ -185,17 +194,19 @@ def _write_wheel_forces(rng: Random, folder: Path, number: int, period: float) -
 
 def judge(drawn_scene: DrawnScene, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     """Verdicts on all settings recommended for a scene: among all these engines, and for each alone."""
-    return verdicts(drawn_scene, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings))
+    return verdicts_on_scene(
+        drawn_scene, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings)
+    )
 
 
-def verdicts(
+def verdicts_on_scene(
     drawn_scene: DrawnScene,
     engines: tuple[str, ...],
     true: Callable[[Recommendation, list[Setting]], dict[Setting, float]],
 ) -> list[Verdict]:
     """Verdicts on the recommendations for a scene; the function ``true`` gives the true error of each recommended
     setting."""
-    recommendation = recommend(priced(drawn_scene.scene, drawn_scene.quantity, engines), drawn_scene.tolerance)
+    recommendation = recommend(priced_scene(drawn_scene.scene, drawn_scene.quantity, engines), drawn_scene.tolerance)
     errors = true(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))
     )
@@ -208,7 +219,7 @@ def verdicts(
             choice.error,
             errors[choice.tried.setting],
             recommendation.truth.uncertainty,
-            slower(recommendation, key, choice),
+            default_is_cheaper(recommendation, key, choice),
             key[1],
         )
         for key, choice in recommendation.winners.items()
@@ -220,9 +231,9 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     where their steps have such."""
     runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
-    common = _fine(scene, math.lcm(*parts.values()))
+    common = _fine_multiple(scene, math.lcm(*parts.values()))
     if scene.base / common < FINE_SPACING:
-        parts = {setting: _fine(scene, n) for setting, n in parts.items()}
+        parts = {setting: _fine_multiple(scene, n) for setting, n in parts.items()}
     else:
         parts = dict.fromkeys(runs, common)
     exact = {
@@ -232,7 +243,7 @@ def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
 
 
-def _fine(scene: PricedPitchPlane, parts: int) -> int:
+def _fine_multiple(scene: PricedPitchPlane, parts: int) -> int:
     """A multiple of ``parts`` for which rows are no further apart than COARSE_SPACING."""
     return parts * math.ceil(scene.base / parts / COARSE_SPACING * (1 - 1e-9))
 
@@ -241,16 +252,16 @@ def _exact_answer(scene: PricedPitchPlane, spacing: float) -> PricedRun:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TRUTH_TOLERANCE)))
 
 
-def slower(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
+def default_is_cheaper(recommendation: Recommendation, key: tuple[str, str], choice: SettingChoice) -> bool:
     """Whether a default setting that keeps the tolerance would have been cheaper than the recommended one."""
     engine, kind = key
-    rivals = [attempt for attempt in _defaults(recommendation) if attempt.setting.engine.startswith(engine)]
+    rivals = [attempt for attempt in _coarsest_defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)
     return any(_is_slower_in_pairs(recommendation, choice, rival) for rival in rivals)
 
 
-def _defaults(recommendation: Recommendation) -> list[TriedSetting]:
+def _coarsest_defaults(recommendation: Recommendation) -> list[TriedSetting]:
     """The coarsest setting of each default method that keeps the tolerance. If the complete run was searched, all tried
     settings count, as the recommendation may have missed one."""
     if not recommendation.whole:
@@ -259,7 +270,7 @@ def _defaults(recommendation: Recommendation) -> list[TriedSetting]:
             for each in recommendation.defaults.values()
             if each.refined is not None and not each.extrapolated
         ]
-    held = recommendation.tolerance - recommendation.searched.uncertainty
+    held = recommendation.tolerance - recommendation.search_truth.uncertainty
     able = sorted(
         (each for each in recommendation.tried if each.setting.default and each.error <= held),
         key=lambda each: each.setting.value,
@@ -268,7 +279,7 @@ def _defaults(recommendation: Recommendation) -> list[TriedSetting]:
 
 
 def _is_slower_in_pairs(recommendation: Recommendation, choice: SettingChoice, rival: TriedSetting) -> bool:
-    if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
+    if rival.setting == choice.tried.setting or rival.seconds > CONTEST_RATIO * choice.seconds:
         return False
     jobs = [
         partial(recommendation.scene.solve, attempt.setting, recommendation.scene.first)

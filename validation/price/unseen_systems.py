@@ -16,7 +16,7 @@ from models.advice.price.problem import Setting
 from models.advice.price.recommendation import Recommendation
 from models.advice.price.truth import ReferenceTruth
 from models.core.systems import SYSTEMS
-from validation.price.unseen import DrawnScene, Random, Verdict, verdicts
+from validation.price.unseen import DrawnScene, Random, Verdict, verdicts_on_scene
 
 SEED = 908
 ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
@@ -25,7 +25,7 @@ TRUTH_CELLS_RATIO, FEWEST_CELLS, MOST_CELLS = 4, 60, 200
 """Times the cells recommended, and the fewest and most cells of a contact."""
 TRUTH_STEPS_RATIO = 3
 """Times the steps of the search's own truth."""
-TOLERANCES = {
+TOLERANCE_RANGES = {
     "y": (1e-6, 1e-4),
     "fy": (20.0, 500.0),
     "yaw_rate": (1e-4, 3e-3),
@@ -39,18 +39,20 @@ Asked = tuple[dict[str, Any], list[str]]
 """Tables of a scene, and the quantities that may be asked about."""
 
 
-def drawn(system: str, number: int) -> DrawnScene:
+def drawn_scene_of_system(system: str, number: int) -> DrawnScene:
     """A random scene of a system for a number, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
-    table, quantities = {"wheelset": _wheelset, "handling": _handling, "braking": _braking}[system](rng)
+    table, quantities = {"wheelset": _random_wheelset, "handling": _random_handling, "braking": _random_braking}[
+        system
+    ](rng)
     table |= {"title": f"{system} {number}", "system": system}
     quantity = str(rng.choice(quantities))
-    low, high = np.log(TOLERANCES[quantity])
+    low, high = np.log(TOLERANCE_RANGES[quantity])
     scene = import_module(SYSTEMS[system].scene).build(table, "", Path())
     return DrawnScene(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
-def _wheelset(rng: Random) -> Asked:
+def _random_wheelset(rng: Random) -> Asked:
     override = {
         "conicity": float(rng.uniform(0.02, 0.2)),
         "stiffness_x": float(rng.uniform(1e5, 1e6)),
@@ -67,7 +69,7 @@ def _wheelset(rng: Random) -> Asked:
     return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": speeds}, ["y", "fy"]
 
 
-def _handling(rng: Random) -> Asked:
+def _random_handling(rng: Random) -> Asked:
     manoeuvre = {
         "speed": float(rng.uniform(12.0, 30.0)),
         "duration": 0.5,
@@ -78,7 +80,7 @@ def _handling(rng: Random) -> Asked:
     return {"tyres": tyres, "manoeuvres": {"drawn": manoeuvre}}, ["yaw_rate", "load"]
 
 
-def _braking(rng: Random) -> Asked:
+def _random_braking(rng: Random) -> Asked:
     kind, surface = str(rng.choice(["straight", "j_turn", "split"])), str(rng.choice(["snow", "wet", "ice"]))
     procedure: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
     if kind == "j_turn":
@@ -98,7 +100,7 @@ def _braking(rng: Random) -> Asked:
 
 def judge(drawn_scene: DrawnScene) -> list[Verdict]:
     """Verdicts on all settings recommended for a scene."""
-    return verdicts(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
+    return verdicts_on_scene(drawn_scene, ENGINES[drawn_scene.scene.system], true_errors)
 
 
 def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:

@@ -11,7 +11,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from validation.replay import jobs as asked
-from validation.replay.answers import JOBS, CommandAnswer, answer, difference, load, read_jobs, save, write_jobs
+from validation.replay.answers import (
+    JOBS_FILE,
+    CommandAnswer,
+    answer_difference,
+    answer_of_job,
+    load,
+    read_jobs,
+    save,
+    write_jobs,
+)
 
 
 def main(words: list[str]) -> int:
@@ -27,31 +36,31 @@ def main(words: list[str]) -> int:
     parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
     given = parser.parse_args(words)
     if given.what == "record":
-        return _record(given)
-    return _check(given)
+        return _record_answers(given)
+    return _check_answers(given)
 
 
-def _record(arguments: argparse.Namespace) -> int:
+def _record_answers(arguments: argparse.Namespace) -> int:
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    if not (arguments.folder / JOBS).exists():
-        write_jobs(arguments.folder, asked.jobs(arguments.command))
-    left = [job for job in _chosen(arguments) if load(arguments.folder, job.name) is None]
-    for job, now in _answers(left, arguments):
+    if not (arguments.folder / JOBS_FILE).exists():
+        write_jobs(arguments.folder, asked.replay_jobs(arguments.command))
+    left = [job for job in _chosen_jobs(arguments) if load(arguments.folder, job.name) is None]
+    for job, now in _answers_of_jobs(left, arguments):
         save(arguments.folder, job.name, now)
         codes = ", ".join(map(str, now.codes))
         print(f"{now.seconds:7.1f} s  {len(now.arrays):4} arrays  {job.name}: {codes}", flush=True)
     return 0
 
 
-def _check(arguments: argparse.Namespace) -> int:
+def _check_answers(arguments: argparse.Namespace) -> int:
     renamed = tomllib.loads(arguments.renamed.read_text()) if arguments.renamed else {}
     counts = {"same": 0, "differ": 0, "other words": 0}
-    for job, now in _answers(_chosen(arguments), arguments):
+    for job, now in _answers_of_jobs(_chosen_jobs(arguments), arguments):
         before = load(arguments.folder, job.name)
         if before is None:
             print(f"{job.name}: was not recorded")
             continue
-        told = difference(before, now, arguments.bound, renamed)
+        told = answer_difference(before, now, arguments.bound, renamed)
         counts["differ" if told.wrong else "other words" if told.tolerated else "same"] += 1
         for text in (told.wrong or told.tolerated)[:5]:
             print(f"{job.name}: {'DIFFERS: ' if told.wrong else ''}{text}", flush=True)
@@ -59,11 +68,11 @@ def _check(arguments: argparse.Namespace) -> int:
     return 1 if counts["differ"] else 0
 
 
-def _chosen(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
+def _chosen_jobs(arguments: argparse.Namespace) -> list[asked.ReplayJob]:
     return [job for job in read_jobs(arguments.folder)[:: arguments.every] if fnmatch.fnmatch(job.name, arguments.only)]
 
 
-def _answers(
+def _answers_of_jobs(
     jobs: list[asked.ReplayJob], arguments: argparse.Namespace
 ) -> Iterator[tuple[asked.ReplayJob, CommandAnswer]]:
     """Answers in the order of the jobs; several jobs run at a time."""
@@ -72,7 +81,7 @@ def _answers(
     try:
         with ThreadPoolExecutor(arguments.workers) as pool:
             yield from zip(
-                jobs, pool.map(lambda job: answer(job, arguments.command, folder / job.name), jobs), strict=True
+                jobs, pool.map(lambda job: answer_of_job(job, arguments.command, folder / job.name), jobs), strict=True
             )
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from validation.replay.jobs import SCENES, ReplayJob
+from validation.replay.jobs import BASE_SCENES, ReplayJob
 
-LIMIT = 900.0
+COMMAND_SECONDS = 900.0
 """Seconds after which a command is ended."""
-MASKS = (
+MESSAGE_MASKS = (
     (r"\d+(\.\d+)?(e[-+]\d+)? (s|ms|us)\b( once)?", "SECONDS"),
     (r"/[\w./-]*/", "PATH/"),
     (r"[\d.]+ times (as long|the)", "RATIO"),
 )
 """What a machine decides in messages, and what stands in its place."""
-JOBS = "jobs.json"
-UNWATCHED = ("seconds", "folder", "command", "price", "range")
+JOBS_FILE = "jobs.json"
+UNWATCHED_KEYS = ("seconds", "folder", "command", "price", "range")
 """Keys of printed tables, and columns, that a machine decides."""
 
 
@@ -41,11 +41,11 @@ class CommandAnswer:
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
 
 
-def answer(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
+def answer_of_job(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
     """Run the commands of a job in a new folder that is deleted afterwards."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for file in SCENES.glob("*.[!t]*"):
+    for file in BASE_SCENES.glob("*.[!t]*"):
         shutil.copy(file, folder)
     (folder / "scene.toml").write_text(job.scene)
     given = {path.name for path in folder.iterdir()}
@@ -62,14 +62,14 @@ def _run_command(words: list[str], folder: Path, answer: CommandAnswer) -> None:
     begun = time.monotonic()
     code, said, wrong = _run(words, folder)
     answer.seconds += time.monotonic() - begun
-    printed = _json(said)
+    printed = _parsed_json(said)
     if printed is not None:
         answer.arrays |= {
             f": {len(answer.codes)}{place}": np.array(value) for place, value in _values_with_places(printed)
         }
         said = ""
     answer.codes.append(code)
-    answer.message += _masked(said + wrong)
+    answer.message += _masked_message(said + wrong)
 
 
 def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
@@ -81,16 +81,16 @@ def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
             env=surroundings,
             capture_output=True,
             text=True,
-            timeout=LIMIT,
+            timeout=COMMAND_SECONDS,
             check=False,
             errors="replace",
         )
     except subprocess.TimeoutExpired:
-        return -1, "", f"ended after {LIMIT:g} s"
+        return -1, "", f"ended after {COMMAND_SECONDS:g} s"
     return done.returncode, done.stdout, done.stderr
 
 
-def _json(text: str) -> Any:
+def _parsed_json(text: str) -> Any:
     try:
         return json.loads(text)
     except ValueError:
@@ -101,16 +101,16 @@ def _values_with_places(value: Any, place: str = "") -> Iterator[tuple[str, floa
     """Numbers and texts of a nested table, each with its place in the table."""
     if isinstance(value, dict | list):
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            if key not in UNWATCHED:
+            if key not in UNWATCHED_KEYS:
                 yield from _values_with_places(inner, f"{place}/{key}")
     elif isinstance(value, bool | int | float):
         yield place, float(value)
     elif value is not None:
-        yield place, _masked(str(value))
+        yield place, _masked_message(str(value))
 
 
-def _masked(text: str) -> str:
-    for pattern, mask in MASKS:
+def _masked_message(text: str) -> str:
+    for pattern, mask in MESSAGE_MASKS:
         text = re.sub(pattern, mask, text)
     return text
 
@@ -118,12 +118,12 @@ def _masked(text: str) -> str:
 def _arrays_of_files(folder: Path, given_files: set[str]) -> Iterator[tuple[str, np.ndarray]]:
     """Arrays of all files in the folder, except files that were there before."""
     for path in sorted(folder.rglob("*")):
-        read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
+        read = {".nc": _netcdf_channels, ".csv": _csv_columns}.get(path.suffix)
         if read is not None and path.name not in given_files:
             yield from ((f"{path.relative_to(folder)}: {name}", array) for name, array in read(path))
 
 
-def _netcdf(path: Path) -> Iterator[tuple[str, np.ndarray]]:
+def _netcdf_channels(path: Path) -> Iterator[tuple[str, np.ndarray]]:
     import h5py
 
     with h5py.File(path) as file:
@@ -134,32 +134,32 @@ def _netcdf(path: Path) -> Iterator[tuple[str, np.ndarray]]:
         yield name, array if array.dtype.kind in "fiub" else array.astype(str)
 
 
-def _csv(path: Path) -> Iterator[tuple[str, np.ndarray]]:
+def _csv_columns(path: Path) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name and values of each column of a CSV file, whose first line holds the names."""
     with path.open(newline="") as file:
         lines = [line for line in csv.reader(file) if line]
     if lines:
         for name, *cells in zip(*[line + [""] * (len(lines[0]) - len(line)) for line in lines], strict=False):
-            yield name, _column(cells)
+            yield name, _column_values(cells)
 
 
-def _column(cells: list[str]) -> np.ndarray:
+def _column_values(cells: list[str]) -> np.ndarray:
     try:
         return np.array([float(cell) for cell in cells])
     except ValueError:
-        return np.array([_masked(cell) for cell in cells])
+        return np.array([_masked_message(cell) for cell in cells])
 
 
 def write_jobs(folder: Path, jobs: list[ReplayJob]) -> None:
     """Save the jobs in the recording, so that a later version runs the same ones."""
-    (folder / JOBS).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
+    (folder / JOBS_FILE).write_text(json.dumps([asdict(job) for job in jobs], indent=1))
 
 
 def read_jobs(folder: Path) -> list[ReplayJob]:
     """The jobs that are saved in a recording."""
     return [
         ReplayJob(each["name"], tuple(map(tuple, each["commands"])), each["scene"])
-        for each in json.loads((folder / JOBS).read_text())
+        for each in json.loads((folder / JOBS_FILE).read_text())
     ]
 
 
@@ -191,7 +191,7 @@ class AnswerDifference:
     tolerated: list[str] = field(default_factory=list)
 
 
-def difference(
+def answer_difference(
     recorded: CommandAnswer, current: CommandAnswer, bound: float, renamed: Mapping[str, str]
 ) -> AnswerDifference:
     """Differences of an answer from the recorded one.
@@ -206,19 +206,19 @@ def difference(
         told.tolerated.append(f"message {recorded.message.strip()[:200]!r} is {current.message.strip()[:200]!r}")
     matched = set()
     for name, array in recorded.arrays.items():
-        if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED):
+        if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED_KEYS):
             continue
-        if (later := _later(name, current.arrays, renamed)) is None:
+        if (later := _renamed_channel(name, current.arrays, renamed)) is None:
             told.wrong.append(f"{name} is gone")
             continue
         matched.add(later)
-        if text := _changed(array, current.arrays[later], bound):
+        if text := _change_text(array, current.arrays[later], bound):
             (told.tolerated if array.dtype.kind == "U" else told.wrong).append(f"{name}: {text}")
     told.tolerated += [f"{name} is new" for name in current.arrays if name not in matched]
     return told
 
 
-def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
+def _renamed_channel(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
     """Name under which a channel occurs in later arrays: unchanged, renamed, or in another file if that is the only one
     with this channel."""
     if (name_then := renamed.get(name, name)) in arrays:
@@ -228,7 +228,7 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
     return others[0] if len(others) == 1 else None
 
 
-def _changed(recorded: np.ndarray, current: np.ndarray, bound: float) -> str:
+def _change_text(recorded: np.ndarray, current: np.ndarray, bound: float) -> str:
     """Text on how an array changed; "" if no change exceeds the bound."""
     if recorded.dtype.kind == current.dtype.kind == "U" and recorded.size == current.size == 1:
         return "" if recorded == current else f"{recorded} is {current}"

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-SCENES = Path(__file__).with_name("scenes")
+BASE_SCENES = Path(__file__).with_name("scenes")
 """Base scenes: each names as many tables as go together, short to run, and the files that they read."""
 SHORT_RUN_SETTINGS = Path(__file__).with_name("shipped.toml")
 """By shipped scene what makes it short to run, as arguments of --set."""
-COMMANDS = Path(__file__).with_name("commands.toml")
+COMMANDS_FILE = Path(__file__).with_name("commands.toml")
 """Jobs of several commands each."""
-VARIED, SEED = 300, 20
+VARIED_JOBS, SEED = 300, 20
 DROPPED_CHANCE, CHANGED_CHANCE, MISTAKE_CHANCE = 0.25, 0.6, 0.2
 """Chances that a table goes, that numbers change, that the scene has a mistake."""
-FACTORS = (0.7, 1.4)
+FACTOR_RANGE = (0.7, 1.4)
 """By which a number that changes is multiplied, at random between them."""
 ENGINES = ("reference", "exudyn", "mujoco", "all")
 KEPT_KEYS = ("title", "system", "study", "vehicle", "run", "options", "quantities", "tolerance")
@@ -38,12 +38,12 @@ class ReplayJob:
     scene: str = ""
 
 
-def jobs(command: str) -> list[ReplayJob]:
+def replay_jobs(command: str) -> list[ReplayJob]:
     """All jobs of a replay; ``command``: the twinrig executable that lists the shipped scenes."""
-    return [ReplayJob("list", (("list",),)), *_shipped(command), *_written_jobs(), *_bases(), *_varied()]
+    return [ReplayJob("list", (("list",),)), *_shipped_jobs(command), *_written_jobs(), *_base_jobs(), *_varied_jobs()]
 
 
-def _shipped(command: str) -> Iterator[ReplayJob]:
+def _shipped_jobs(command: str) -> Iterator[ReplayJob]:
     """Jobs for every listed scene: one shows it, one runs it."""
     shorter = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
     said = subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
@@ -56,15 +56,15 @@ def _shipped(command: str) -> Iterator[ReplayJob]:
 
 
 def _written_jobs() -> Iterator[ReplayJob]:
-    for job in tomllib.loads(COMMANDS.read_text())["jobs"]:
+    for job in tomllib.loads(COMMANDS_FILE.read_text())["jobs"]:
         yield ReplayJob(f"commands-{job['name']}", tuple(tuple(words) for words in job["commands"]))
 
 
-def _bases() -> Iterator[ReplayJob]:
+def _base_jobs() -> Iterator[ReplayJob]:
     """Jobs for every base scene without changes: one shows it, and one runs it in each of its engines."""
     from tomli_w import dumps
 
-    for base in sorted(SCENES.glob("*.toml")):
+    for base in sorted(BASE_SCENES.glob("*.toml")):
         scene = tomllib.loads(base.read_text())
         engines = scene.pop("engines_asked", ENGINES)
         for engine in engines or ("",):
@@ -77,9 +77,9 @@ def _run_command(engine: str) -> tuple[str, ...]:
     return ("run", "scene.toml", *(("--engine", engine) if engine else ()), "--json", "--out", "out")
 
 
-def _varied() -> Iterator[ReplayJob]:
-    bases = sorted(SCENES.glob("*.toml"))
-    for i in range(VARIED):
+def _varied_jobs() -> Iterator[ReplayJob]:
+    bases = sorted(BASE_SCENES.glob("*.toml"))
+    for i in range(VARIED_JOBS):
         base = bases[i % len(bases)]
         random = np.random.default_rng([SEED, i])
         yield _draw_scene(f"{base.stem}-{i:03d}", tomllib.loads(base.read_text()), random)
@@ -92,16 +92,16 @@ def _draw_scene(name: str, scene: Table, random: np.random.Generator) -> ReplayJ
 
     engines = scene.pop("engines_asked", ENGINES)
     engine = str(random.choice(engines)) if engines else ""
-    _drop(scene, random)
+    _drop_key(scene, random)
     if random.random() < CHANGED_CHANCE:
         for place in random.permutation(list(_places_of_numbers(scene)))[:3]:
-            _change(scene, str(place), float(random.uniform(*FACTORS)))
+            _change_number(scene, str(place), float(random.uniform(*FACTOR_RANGE)))
     if random.random() < MISTAKE_CHANCE:
-        engine = _mistake(scene, engine, random)
+        engine = _make_mistake(scene, engine, random)
     return ReplayJob(name, (_run_command(engine),), dumps(scene))
 
 
-def _drop(scene: Table, random: np.random.Generator) -> None:
+def _drop_key(scene: Table, random: np.random.Generator) -> None:
     effects = scene.get("effects")
     for table in (scene, effects if isinstance(effects, dict) else {}):
         for key in list(table):
@@ -125,12 +125,12 @@ def _table_and_key(scene: Table, place: str) -> tuple[Table, str]:
     return scene, key
 
 
-def _change(scene: Table, place: str, factor: float) -> None:
+def _change_number(scene: Table, place: str, factor: float) -> None:
     table, key = _table_and_key(scene, place)
     table[key] = float(f"{factor * table[key]:.4g}")
 
 
-def _mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
+def _make_mistake(scene: Table, engine: str, random: np.random.Generator) -> str:
     """Put a typical user's mistake into a scene; returns the engine to ask for, which may be the mistake."""
     before = copy.deepcopy(scene)
     places = sorted(_places_of_numbers(before))

@@ -5,14 +5,14 @@ from collections import Counter
 from pathlib import Path
 
 from validation.blind_spots.shared import compiled_functions
-from validation.blind_spots.table import JOINED, KEPT, Line, read, uncovered
+from validation.blind_spots.table import LIST_SEPARATOR, TABLE_FILE, Line, read, uncovered_functions
 from validation.common.rows import Saved
 
 SHOWN_IDS = 3
 """Ids of rows and of tests that a line names; of the others it tells how many they are."""
 
 
-def blind_spots(path: Path = KEPT) -> Saved:
+def blind_spots(path: Path = TABLE_FILE) -> Saved:
     """Content of the report's page: lines of the saved table, counts by module, commits, and functions that no
     independent check covers, by the reason.
 
@@ -22,14 +22,14 @@ def blind_spots(path: Path = KEPT) -> Saved:
     names = dict.fromkeys((*(line.function for line in lines), *compiled_functions()))
     return {
         "lines": [_function_record(line) for line in lines],
-        "modules": _modules(lines),
+        "modules": _counts_by_module(lines),
         "commits": [commit for commit, _ in Counter(line.commit for line in lines).most_common()],
-        "uncovered": uncovered(lines, names),
+        "uncovered": uncovered_functions(lines, names),
     }
 
 
 def _function_record(audit_line: Line) -> Saved:
-    rows, tests = (text.split(JOINED) if text else [] for text in (audit_line.rows, audit_line.tests))
+    rows, tests = (text.split(LIST_SEPARATOR) if text else [] for text in (audit_line.rows, audit_line.tests))
     return {
         "function": audit_line.function.replace(".<locals>", ""),
         "independent": audit_line.is_covered,
@@ -43,7 +43,7 @@ def _function_record(audit_line: Line) -> Saved:
     }
 
 
-def _modules(lines: list[Line]) -> list[tuple[str, int, int, int]]:
+def _counts_by_module(lines: list[Line]) -> list[tuple[str, int, int, int]]:
     """Counts for each module: functions, those covered by an independent check, and those covered by any check."""
     of: dict[str, list[Line]] = {}
     for line in lines:

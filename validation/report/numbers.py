@@ -8,11 +8,11 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-PLAIN = (1e-3, 1e5)
+PLAIN_MAGNITUDES = (1e-3, 1e5)
 """Magnitudes that are written without a power of ten."""
 
 
-def number(value: Any, digits: int = 4) -> Markup:
+def number_markup(value: Any, digits: int = 4) -> Markup:
     """Text of a number with ``digits`` significant digits, such as ``0.0123`` or ``8.9e-16``; text stays as it is, None
     becomes a dash."""
     if value is None or value == "":
@@ -23,18 +23,18 @@ def number(value: Any, digits: int = 4) -> Markup:
         return Markup("not a number") if math.isnan(value) else Markup("infinite" if value > 0 else "-infinite")
     if isinstance(value, int) and abs(value) < 10**7:
         return Markup(value)
-    if value == 0 or PLAIN[0] <= abs(value) < PLAIN[1]:
+    if value == 0 or PLAIN_MAGNITUDES[0] <= abs(value) < PLAIN_MAGNITUDES[1]:
         return Markup(_significant(value, digits))
-    return Markup(_scientific(value, digits))
+    return Markup(_scientific_text(value, digits))
 
 
 def error(value: Any) -> Markup:
     """Text of an error or tolerance, with four significant digits in fixed notation, and two in powers of ten."""
-    plain = isinstance(value, int | float) and PLAIN[0] <= abs(value) < PLAIN[1]
-    return number(value, 4 if plain else 2)
+    plain = isinstance(value, int | float) and PLAIN_MAGNITUDES[0] <= abs(value) < PLAIN_MAGNITUDES[1]
+    return number_markup(value, 4 if plain else 2)
 
 
-def _scientific(value: float, digits: int) -> str:
+def _scientific_text(value: float, digits: int) -> str:
     """Text in scientific notation such as ``8.9e-16``, without leading zeros in the exponent."""
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
@@ -47,7 +47,7 @@ def _significant(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def margin(row: dict[str, Any]) -> float | None:
+def margin_of_row(row: dict[str, Any]) -> float | None:
     """Ratio of |value - expected| to the tolerance; None if there is no tolerance or it is zero."""
     value, expected, tolerance = row["value"], row["expected"], row["tolerance"]
     numeric = all(isinstance(x, int | float) and not isinstance(x, bool) for x in (value, expected, tolerance))
@@ -56,12 +56,12 @@ def margin(row: dict[str, Any]) -> float | None:
     return abs(value - expected) / tolerance
 
 
-def share(value: float | None) -> Markup:
+def share_markup(value: float | None) -> Markup:
     """Text of a margin: per cent of the tolerance, or how many times it is exceeded."""
     if value is None or math.isnan(value):
         return Markup("–")
     if value > 10:
-        return number(value, 2) + Markup(" times")
+        return number_markup(value, 2) + Markup(" times")
     if 0 < value < 1e-4:
         return Markup("&lt; 0.01 %")
     return Markup(f"{_significant(100 * value, 2) if value else '0'} %")
@@ -74,14 +74,14 @@ def duration(seconds: float) -> str:
 
 
 POWER_OF_TEN = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
-NUMERIC = re.compile(
+NUMERIC_PATTERN = re.compile(
     r"[-−+±<>≤≥~ ]*\d[\d,]*(\.\d+)?(e[+-]?\d+)?\*?( ?(%|s|ms|x))?( (±|\+/-) [\d.]+)?"
     r"|[-–]?|never|refused|not met"
 )
 """A cell of a table that reads as a number, or as the absence of one."""
 
 
-def powers(cell: Any) -> Markup:
+def powers_markup(cell: Any) -> Markup:
     """Text with numbers such as 2e-06 written ``2e-6``, and those up to a thousand without a power of ten."""
 
     def written(match: re.Match[str]) -> str:
@@ -95,11 +95,14 @@ def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> list[bool]:
     """Flags for the columns of a table, ``count`` or more, that hold numbers and go to the right; the first one never
     does."""
     columns = [[str(cell).strip() for cell in column] for column in zip_longest([""] * count, *rows, fillvalue="")]
-    right = [all(map(NUMERIC.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column) for column in columns]
+    right = [
+        all(map(NUMERIC_PATTERN.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column)
+        for column in columns
+    ]
     return [False, *right[1:]]
 
 
-def marked(text: str) -> Markup:
+def docstring_markup(text: str) -> Markup:
     """Text of a docstring: **strong** and ``code``."""
     strong = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text)))
     return Markup(re.sub(r"``(.+?)``", r"<code>\1</code>", strong))

@@ -20,14 +20,23 @@ from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
 from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
 from validation.report.blind_spots import blind_spots
-from validation.report.numbers import duration, error, margin, marked, number, numeric_columns, powers, share
-from validation.report.shares import case_of, shares
-from validation.report.shown import shown
+from validation.report.numbers import (
+    docstring_markup,
+    duration,
+    error,
+    margin_of_row,
+    number_markup,
+    numeric_columns,
+    powers_markup,
+    share_markup,
+)
+from validation.report.shares import case_of, shares_of_systems
+from validation.report.shown import case_on_page
 
-TEMPLATE = "page.html.jinja"
-BLANK: Saved = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
+PAGE_TEMPLATE = "page.html.jinja"
+BLANK_PROVENANCE: Saved = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
 """What a page needs of its provenance, where the results do not hold it."""
-KINDS = {
+INDEPENDENCE_TEXTS = {
     "native": "both sides have force laws of their own; what they share is the description of the vehicle",
     "handed over": "the engine is handed M, D and K of the description: what is tested is these and the integrator, no "
     "spring of the engine's own",
@@ -37,25 +46,25 @@ KINDS = {
     "measured": "the other side was measured on a real vehicle",
     "none": "there is no second side: a behaviour, or a count",
 }
-assert set(KINDS) == set(get_args(Independence))
+assert set(INDEPENDENCE_TEXTS) == set(get_args(Independence))
 
 
-def verdict(results: Saved) -> Saved:
+def report_verdict(results: Saved) -> Saved:
     """Verdict of the report: number of rows by status, warnings on their source, the tightest passed row, and the
     computing time."""
     rows = results["rows"]
     of = {status: [row for row in rows if row["status"] == status] for status in STATUSES}
-    margins = [(ratio, row) for row in of["passed"] if (ratio := margin(row)) is not None]
+    margins = [(ratio, row) for row in of["passed"] if (ratio := margin_of_row(row)) is not None]
     return {
         "count": len(rows),
         "of": of,
         "worst": max(margins, key=lambda pair: pair[0], default=None),
         "seconds": results["provenance"]["wall"],
-        "source": _source(results["provenance"]),
+        "source": _source_lines(results["provenance"]),
     }
 
 
-def _source(provenance: Saved) -> list[tuple[str, str]]:
+def _source_lines(provenance: Saved) -> list[tuple[str, str]]:
     """Version, commit, date, machine and data, as (name, value)."""
     known = {"version": "twinrig", "commit": "commit", "date": "date", "machine": "machine", "data": "data"}
     return [(name, str(provenance.get(key) or "not saved")) for name, key in known.items()]
@@ -67,18 +76,18 @@ def silent_systems(rows: list[Saved]) -> list[str]:
     return [system for system in get_args(System) if system not in run]
 
 
-def systems(results: Saved, shown: dict[str, Saved]) -> list[Saved]:
+def rows_by_system(results: Saved, shown: dict[str, Saved]) -> list[Saved]:
     """Rows grouped by system and, within it, by case, in the order of the report; shown: tables and figures of each
     case."""
     order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
     by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
     return [
-        {"name": system, "cases": list(_cases(list(rows), results["provenance"]["seconds"], shown))}
+        {"name": system, "cases": list(_cases_of_system(list(rows), results["provenance"]["seconds"], shown))}
         for system, rows in groupby(by_system, key=lambda row: row["system"])
     ]
 
 
-def _cases(rows: list[Saved], seconds: dict[str, float], shown: dict[str, Saved]) -> Iterator[Saved]:
+def _cases_of_system(rows: list[Saved], seconds: dict[str, float], shown: dict[str, Saved]) -> Iterator[Saved]:
     for name in dict.fromkeys(map(case_of, rows)):
         of_case = [row for row in rows if case_of(row) == name]
         groups: dict[str, list[Saved]] = {}
@@ -101,24 +110,28 @@ def independence(results: Saved, shown: dict[str, Saved]) -> Saved:
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
         kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
-        lines.append((name, shown[name]["title"], [kinds.count(kind) for kind in KINDS]))
-    return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
+        lines.append((name, shown[name]["title"], [kinds.count(kind) for kind in INDEPENDENCE_TEXTS]))
+    return {
+        "kinds": INDEPENDENCE_TEXTS,
+        "lines": lines,
+        "total": [sum(line[2][i] for line in lines) for i in range(len(INDEPENDENCE_TEXTS))],
+    }
 
 
-def evidence(rows: list[Saved]) -> list[tuple[str, list[int]]]:
-    """For each system, the number of rows with each kind of independent second side, in the order of KINDS; rows not
-    run are left out."""
+def evidence_counts(rows: list[Saved]) -> list[tuple[str, list[int]]]:
+    """For each system, the number of rows with each kind of independent second side, in the order of
+    INDEPENDENCE_TEXTS; rows not run are left out."""
     ran = [row for row in rows if row["status"] != "not run"]
     names = dict.fromkeys(row["system"] for row in ran)
     kinds = {name: [row["independence"] for row in ran if row["system"] == name] for name in names}
-    return [(name, [each.count(kind) for kind in KINDS]) for name, each in kinds.items()]
+    return [(name, [each.count(kind) for kind in INDEPENDENCE_TEXTS]) for name, each in kinds.items()]
 
 
 NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
 """What differs between the allowed breaches of alike runs of a case."""
 
 
-def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
+def allowed_assumptions(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
     """Allowed broken assumptions, similar ones grouped, and the rows that rest on them."""
     alike_rows: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
@@ -174,7 +187,7 @@ def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
     """
     results = read(folder / "results.json")
     path = folder / "report.html"
-    write_whole(path, page(results, folder / "data", each))
+    write_whole(path, page_text(results, folder / "data", each))
     return path
 
 
@@ -183,7 +196,7 @@ def read(path: Path) -> Saved:
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
         return {
-            "provenance": {**BLANK, **results["provenance"]},
+            "provenance": {**BLANK_PROVENANCE, **results["provenance"]},
             "rows": [of_saved(row) for row in results["rows"]],
             "against": results.get("against"),
         }
@@ -193,24 +206,24 @@ def read(path: Path) -> Saved:
         raise InputError(path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
+def page_text(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
-    filters = (number, error, share, duration, powers, marked, numeric_columns)
+    filters = (number_markup, error, share_markup, duration, powers_markup, docstring_markup, numeric_columns)
     environment.filters |= {filter.__name__: filter for filter in filters}
-    environment.globals |= {"margin": margin, "case_of": case_of}
+    environment.globals |= {"margin": margin_of_row, "case_of": case_of}
     names = list(dict.fromkeys(map(case_of, results["rows"])))
-    drawn = dict(zip(names, each(partial(shown, data), names), strict=True))
-    return environment.get_template(TEMPLATE).render(
-        verdict=verdict(results),
+    drawn = dict(zip(names, each(partial(case_on_page, data), names), strict=True))
+    return environment.get_template(PAGE_TEMPLATE).render(
+        verdict=report_verdict(results),
         against=results.get("against"),
-        systems=systems(results, drawn),
+        systems=rows_by_system(results, drawn),
         silent=silent_systems(results["rows"]),
-        shares=shares(results),
+        shares=shares_of_systems(results),
         independence=independence(results, drawn),
-        evidence=evidence(results["rows"]),
+        evidence=evidence_counts(results["rows"]),
         measured_rows=sum(row["independence"] == "measured" and row["status"] != "not run" for row in results["rows"]),
-        allowances=allowances(results["rows"]),
+        allowances=allowed_assumptions(results["rows"]),
         blind=blind_spots(),
         conventions=conventions(),
         parameters=parameter_tables(),

@@ -36,7 +36,7 @@ assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values())
 
 
 @cache
-def full() -> dict[str, Saved]:
+def full_report_data() -> dict[str, Saved]:
     """Data of each case in the last full report: number of rows by system, seconds, and commit."""
     kept: dict[str, Saved] = json.loads(KEPT_REPORT.read_text(encoding="utf-8"))
     return kept
@@ -48,7 +48,7 @@ def case_of(row: Saved) -> str:
     return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
 
 
-def shares(results: Saved) -> list[Saved]:
+def shares_of_systems(results: Saved) -> list[Saved]:
     """For each system, the numbers of cases and rows that were measured, those of a full report, and the stated
     computing times.
 
@@ -72,11 +72,11 @@ def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], s
         "rows": sum(counted[case][system] for case in shared),
         "seconds": sum(seconds.get(case, 0.0) for case in main_cases),
         "stated": QUICK_SHARES[system],
-        "full_rows": sum(full()[case]["rows"].get(system, 0) for case in shared)
-        if full().keys() >= set(shared)
+        "full_rows": sum(full_report_data()[case]["rows"].get(system, 0) for case in shared)
+        if full_report_data().keys() >= set(shared)
         else None,
-        "full_seconds": sum(full()[case]["seconds"] for case in main_cases)
-        if full().keys() >= set(main_cases)
+        "full_seconds": sum(full_report_data()[case]["seconds"] for case in main_cases)
+        if full_report_data().keys() >= set(main_cases)
         else None,
     }
 
@@ -102,7 +102,7 @@ def keep(folder: Path) -> None:
         for case, systems in _row_counts(results["rows"]).items()
         if case in source["seconds"]
     }
-    write_whole(KEPT_REPORT, (json.dumps(dict(sorted((full() | new).items())), indent=1) + "\n").encode())
+    write_whole(KEPT_REPORT, (json.dumps(dict(sorted((full_report_data() | new).items())), indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":

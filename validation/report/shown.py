@@ -22,16 +22,16 @@ LARGEST_SVG = 150_000
 """Bytes; above, the figure is drawn in points of colour."""
 
 
-def shown(folder: Path, name: str) -> Saved:
+def case_on_page(folder: Path, name: str) -> Saved:
     """Title, tables and figures of a case, and texts on the case and its share; "notes" say what could not be read.
 
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
-    module = _module(name)
+    module = _case_module(name)
     content: Saved = {
         "title": getattr(module, "TITLE", name.replace("_", " ")),
-        "about": _doc(module),
-        "share": _doc(getattr(module, "measure", None)),
+        "about": _first_paragraph(module),
+        "share": _first_paragraph(getattr(module, "measure", None)),
         "tables": [],
         "figures": [],
         "notes": [],
@@ -46,7 +46,7 @@ def shown(folder: Path, name: str) -> Saved:
     except (OSError, ValueError):
         content["notes"].append(f"data/{path.name} is missing or damaged: no tables and figures.")
         return content
-    for kind, make in (("tables", _tables), ("figures", _figures)):
+    for kind, make in (("tables", _tables_of_case), ("figures", _figures_of_case)):
         try:
             content[kind] = list(make(module, saved, name))
         except Exception as error:  # old data under new code must still give a page
@@ -56,7 +56,7 @@ def shown(folder: Path, name: str) -> Saved:
     return content
 
 
-def _module(name: str) -> ModuleType | None:
+def _case_module(name: str) -> ModuleType | None:
     """The module of a case, None where this checkout has none of that name."""
     if not name.isidentifier():
         return None
@@ -66,29 +66,29 @@ def _module(name: str) -> ModuleType | None:
         return None
 
 
-def _doc(documented: Any) -> str:
+def _first_paragraph(documented: Any) -> str:
     """First paragraph of the docstring of a module or function."""
     return "" if documented is None else (inspect.getdoc(documented) or "").partition("\n\n")[0]
 
 
-def _tables(module: Any, saved: Any, name: str) -> Iterable[Any]:
+def _tables_of_case(module: Any, saved: Any, name: str) -> Iterable[Any]:
     return module.tables(saved) if hasattr(module, "tables") else ()
 
 
-def _figures(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
+def _figures_of_case(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
     for i, (caption, figure) in enumerate(module.draw(saved) if hasattr(module, "draw") else ()):
-        yield caption, inline(figure, caption, f"{name}-{i}")
+        yield caption, inline_figure(figure, caption, f"{name}-{i}")
 
 
-def inline(figure: Any, caption: str, key: str) -> Markup:
+def inline_figure(figure: Any, caption: str, key: str) -> Markup:
     """A figure as self-contained markup; ``key`` makes its identifiers differ from those of other figures."""
 
-    vector = _svg(figure, caption, key)
-    picture = vector if len(vector) <= LARGEST_SVG else _png(figure, caption)
+    vector = _svg_markup(figure, caption, key)
+    picture = vector if len(vector) <= LARGEST_SVG else _png_markup(figure, caption)
     return Markup(picture)
 
 
-def _svg(figure: Any, caption: str, key: str) -> str:
+def _svg_markup(figure: Any, caption: str, key: str) -> str:
     """SVG element without prologue, metadata and needless digits; the figure is drawn once, whereas ``savefig`` draws
     it twice."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -98,19 +98,19 @@ def _svg(figure: Any, caption: str, key: str) -> str:
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r'(?<= d=")[^"]*', _shorter, text)
+    text = re.sub(r'(?<= d=")[^"]*', _rounded_svg_path, text)
     text = re.sub(r'(?<=id=")|(?<=url\(#)|(?<=href="#)', f"{key}-", text)
     text = re.sub(r">\s+<", "><", text).strip()
     return text.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
 
 
-def _shorter(path: re.Match[str]) -> str:
+def _rounded_svg_path(path: re.Match[str]) -> str:
     """Path of an SVG with coordinates rounded to a hundredth of a point."""
     rounded = re.sub(r"-?\d+\.\d+", lambda matched: f"{float(matched[0]):.2f}".rstrip("0").rstrip("."), path[0])
     return rounded.replace("\n", " ")
 
 
-def _png(figure: Any, caption: str) -> str:
+def _png_markup(figure: Any, caption: str) -> str:
     """PNG with a palette of 256 colours, as data within the page."""
     from PIL import Image
 

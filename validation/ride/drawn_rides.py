@@ -10,20 +10,20 @@ import numpy as np
 
 from models.advice.ride_choice.in_time import CopiesInTime, in_time
 from models.advice.ride_choice.reduced import FullScene
-from models.ride.covariance import FINITE, stationary
+from models.ride.covariance import FINITE, stationary_covariance
 from models.systems.ride.omissions import wheels_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import build
 from models.vehicles.spatial import Body, Curve, PointOutput, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.rides import twin
+from validation.ride.rides import changed_vehicle
 
 VEHICLES = ("quarter_car", "half_car", "half_car", "seven_freedoms")
 BENT_VEHICLES, TOLERANCES = ("quarter_car", "quarter_car", "half_car"), (0.02, 0.02, 0.05, 0.01)
 """Drawn scenes with bent springs take these in turn."""
-SEED, LASTING, COPIES = 2211, 8.0, 48
+SEED, RUN_DURATION, COPIES = 2211, 8.0, 48
 UP = (0.0, 0.0, 1.0)
-_loaded = cache(load_vehicle)
+_load_vehicle = cache(load_vehicle)
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class BentRide:
 
     def opened(self, copies: int = COPIES, seed: int = 1) -> CopiesInTime:
         """The scene prepared for runs in time, with ``copies`` Monte Carlo copies."""
-        options = {"copies": copies, "lasting": LASTING, "seed": seed}
+        options = {"copies": copies, "lasting": RUN_DURATION, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 
 
@@ -61,7 +61,7 @@ class Draw:
         return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
 
-def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> DrawnRide:
+def drawn_ride(seed: int, tolerance: float | None = None, detailed: bool = True) -> DrawnRide:
     """The random linear scene of a seed; the tolerance is random from 0.5 to 10 % by default.
 
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
@@ -70,11 +70,11 @@ def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> D
     draw = Draw(seed)
     rng = draw.random
     name = str(rng.choice(VEHICLES))
-    vehicle = _vehicle(twin(_loaded(name), seed), draw, detailed)
+    vehicle = _vehicle(changed_vehicle(_load_vehicle(name), seed), draw, detailed)
     cutoff = draw.between(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
     scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
-    ride = stationary(FullScene(scene, speed).full.system)
+    ride = stationary_covariance(FullScene(scene, speed).full.system)
     silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
     told = [n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent]
     count = min(len(told), int(rng.integers(1, 3)))
@@ -122,14 +122,14 @@ def drawn_bent(number: int) -> BentRide:
     draw = Draw([SEED, number])
     name = BENT_VEHICLES[number % len(BENT_VEHICLES)]
     vehicle = load_vehicle(name)
-    springs = tuple(_bent(spring, draw) for spring in vehicle.springs)
+    springs = tuple(_bent_spring(spring, draw) for spring in vehicle.springs)
     level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
     asked = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
     scene = _scene(f"bent {number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
     return BentRide(scene, tuple(map(str, asked)), TOLERANCES[number % len(TOLERANCES)])
 
 
-def _bent(spring: SpringDamper, generator: Draw) -> SpringDamper:
+def _bent_spring(spring: SpringDamper, generator: Draw) -> SpringDamper:
     """A spring made nonlinear: a digressive damper that is harder in rebound, two bump stops, and friction, each with
     high probability."""
     c, rebound, digressive = spring.damping, generator.between(1.0, 2.5), generator.between(0.3, 1.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.road.fitted import FittedRoad, fit_road
 from models.road.iso8608 import level_of_class
 from models.road.isotropic import isotropic_like
@@ -17,21 +17,21 @@ from models.road.measured_tracks import MeasuredTracks, read_tracks
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import road_of_level
 from validation.common.rows import Observed, Row, System, Table, not_run
-from validation.common.scenes import COURSE, data_folder
+from validation.common.scenes import COURSE_FILE, data_folder
 
 SYSTEM: System = "ride"
 SEED = 41
 """Of the road that is made, measured and fitted again."""
 HALF_TRACK = 0.7
-DATA = {"belgian_block.crg": (None, None), COURSE: (100.0, 404.8), "Horstwalde.crg": (None, None)}
+ROAD_SECTIONS = {"belgian_block.crg": (None, None), COURSE_FILE: (100.0, 404.8), "Horstwalde.crg": (None, None)}
 """Measured roads and the section (m) of each that is looked at."""
 
 
-def made(length: float) -> tuple[list[Row], dict[str, Any]]:
+def fitted_made_road(length: float) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data: a road is generated from the two filters of the model, and the fit must find these filters
     again."""
     road, step = road_of_level(HALF_TRACK), 0.05
-    noise = normal(SEED, 0, round(length / step), 2)
+    noise = normal_samples(SEED, 0, round(length / step), 2)
     mean, roll = (_first_order_samples(f, noise[:, i], step) for i, f in enumerate((road.mean, road.roll)))
     tracks = MeasuredTracks(mean + HALF_TRACK * roll, mean - HALF_TRACK * roll, step, HALF_TRACK, "made")
     fitted = fit_road(tracks, min(200.0, length / 4.5))
@@ -64,13 +64,13 @@ def _first_order_samples(f: ShapeFilter, noise: np.ndarray, step: float) -> np.n
     return lfilter([1.0], [1.0, -kept], driven)
 
 
-def measured() -> tuple[list[Row], list[dict[str, Any]]]:
+def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
     """Rows: properties of measured roads, and limits of what a fit can determine."""
     data = data_folder()
     if data is None:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
     rows, shown = [], []
-    for name, (first, last) in DATA.items():
+    for name, (first, last) in ROAD_SECTIONS.items():
         tracks = read_tracks(data / name, first=first, last=last)
         fitted = fit_road(tracks)
         if name == "belgian_block.crg":
@@ -90,7 +90,7 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
                 f"ride_road.measured.{name.split('.')[0]}",
                 SYSTEM,
                 f"{name}: rms of ln(measured / fitted) spectrum of the mean process",
-                fitted.mean.residual,
+                fitted.mean.log_residual,
                 "",
             ).beside("", why)
         )
@@ -103,7 +103,14 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
     some = np.unique(np.geomspace(1, len(spectra.wavenumber), 160).astype(int)) - 1
     fits = [
         fit
-        and [fit.filter.corner, fit.corner_error, fit.filter.intensity, fit.intensity_error, fit.residual, fit.resolved]
+        and [
+            fit.filter.corner,
+            fit.corner_error,
+            fit.filter.intensity,
+            fit.intensity_error,
+            fit.log_residual,
+            fit.corner_is_resolved,
+        ]
         for fit in (fitted.mean, fitted.roll)
     ]
     return {
@@ -117,7 +124,7 @@ def _figure_numbers(tracks: MeasuredTracks, fitted: FittedRoad) -> dict[str, Any
     }
 
 
-def _verdict(resolved: bool, residual: float) -> str:
+def _verdict_text(resolved: bool, residual: float) -> str:
     if residual > math.log(2.0):
         return "not of first order"
     return "first order" if resolved else "a level only"
@@ -135,7 +142,7 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
                     f"{corner:.3g} ({100 * corner_error:.0f} %)" if resolved else "not told",
                     f"{q:.3g} {unit} ({100 * q_error:.0f} %)",
                     f"{math.exp(residual):.2f}",
-                    _verdict(resolved, residual),
+                    _verdict_text(resolved, residual),
                 ]
             rows.append((road["name"], f"{road['length']:.5g}", process, *columns))
     note = (
@@ -149,7 +156,7 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
 def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) -> tuple[str, Any]:
     """Figure with spectra over the wavenumber (left) and coherency of both tracks (right); measured roads as thin
     lines."""
-    from models.drawing.figures import COLUMN_WIDTH, heading, subplots
+    from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
     isotropic = isotropic_like(road, half_track)
@@ -179,7 +186,9 @@ def coherency_figure(half_track: float, measured_roads: list[dict[str, Any]]) ->
     right.set(title="Coherency of left and right [-]", xlabel="wavenumber [rad/m]", xlim=(0.02, 100), ylim=(0, 1.05))
     for axis in (left, right):
         axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
-    heading(figure, "A road of mean and roll process: both tracks move together in long waves and part in short ones")
+    add_heading(
+        figure, "A road of mean and roll process: both tracks move together in long waves and part in short ones"
+    )
     said = (
         f"Tracks {2 * half_track:g} m apart with the values read from the paper; its vehicle and measurements are "
         "not recoverable. Dotted levels: what chance alone shows in 95 % of the windowed estimates."

@@ -10,18 +10,18 @@ from scipy.linalg import expm
 
 from models.core.scene_file import parse
 from models.ride.closed_forms import QuarterCar
-from models.ride.covariance import stationary
-from models.ride.excited import DelayedSystem, excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
-from validation.ride.rides import INTENSITY, off, one_track
+from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_track
 
 SPEED = 20.0
-CORNER = (300.0, 40.0, 2e4, 1500.0, 2e5)
+QUARTER_CAR_NUMBERS = (300.0, 40.0, 2e4, 1500.0, 2e5)
 """Masses of body and wheel, spring, damper and tyre of a quarter car."""
-BODY, UP = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+BODY_PLACE, BODY_AXIS = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
 """Where a body of one freedom lies, and its axis."""
 
 
@@ -33,22 +33,27 @@ def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -
 def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
     """Case: a quarter car with some values changed. Error: relative error of acceleration and travel against the closed
     form."""
-    exact = replace(QuarterCar(*CORNER), **car)
+    exact = replace(QuarterCar(*QUARTER_CAR_NUMBERS), **car)
 
     def error(implementation: str, folder: Path) -> float:
-        worst, vehicle = 0.0, quarter(*vars(exact).values())
+        worst, vehicle = 0.0, quarter_car(*vars(exact).values())
         for speed in speeds:
-            covariance = stationary(excited(linear(vehicle, implementation), one_track((0.0,), corner), speed))
-            q, w = INTENSITY * speed, corner * speed
+            covariance = stationary_covariance(
+                vehicle_with_road(linear(vehicle, implementation), one_track((0.0,), corner), speed)
+            )
+            q, w = ROAD_INTENSITY * speed, corner * speed
             worst = max(
-                worst, off(covariance.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)])
+                worst,
+                largest_relative_error(
+                    covariance.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)]
+                ),
             )
         return worst
 
     return error
 
 
-def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
+def quarter_car(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
     """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
     car = replace(load_vehicle("quarter_car"), name="quarter")
     bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (m_s, m_u), strict=True))
@@ -56,28 +61,28 @@ def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float =
     return replace(car, bodies=bodies, springs=springs, tyres=(replace(car.tyres[0], stiffness=k_t, damping=c_t),))
 
 
-def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
+def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
     """A body on a tyre with a damper to the ground; outputs: acceleration and height of the body."""
-    outputs = tuple(PointOutput(kind, kind, "body", BODY, UP) for kind in ("acceleration", "displacement"))
-    damper = SpringDamper("damper", "body", None, BODY, BODY, UP, 0.0, damping)
+    outputs = tuple(PointOutput(kind, kind, "body", BODY_PLACE, BODY_AXIS) for kind in ("acceleration", "displacement"))
+    damper = SpringDamper("damper", "body", None, BODY_PLACE, BODY_PLACE, BODY_AXIS, 0.0, damping)
     return SpatialVehicle(
         "single",
-        (Body("body", mass, BODY, ("z",)),),
+        (Body("body", mass, BODY_PLACE, ("z",)),),
         (damper,),
-        (Tyre("tyre", "body", BODY, 0, stiffness),),
+        (Tyre("tyre", "body", BODY_PLACE, 0, stiffness),),
         (0.0,),
         outputs=outputs,
     )
 
 
 @cache
-def steered() -> SpatialVehicle:
+def roll_steered_vehicle() -> SpatialVehicle:
     """R19-free with roll steer at the front axle; outputs: heading and lateral position."""
     table = parse(SHIPPED / "r19_free.toml")
     table["axles"][0]["roll_steer"] = 0.05
     vehicle = build_vehicle(table, "steered")
     outputs = (
-        TurnOutput("heading", "angle", "body", UP),
+        TurnOutput("heading", "angle", "body", BODY_AXIS),
         PointOutput("place", "displacement", "body", vehicle.body("body").position, (0.0, 1.0, 0.0)),
     )
     return replace(vehicle, outputs=outputs)

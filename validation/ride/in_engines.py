@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.ride.frequency import one_sided, standard_errors
 from models.ride.road_path import road_path
-from models.ride.statistical_linearisation import promised, statistically_linear
+from models.ride.statistical_linearisation import promised_error, statistically_linear
 from models.road.excitation import Excitation
-from models.road.two_track import LEVEL
-from models.systems.ride.nonlinear import Ride, ridden
+from models.road.two_track import TRACK_DENSITY_LEVEL
+from models.systems.ride.nonlinear import Ride, drive_over_road
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
@@ -24,7 +24,7 @@ from validation.ride.rides import paper_road
 SYSTEM: System = "ride"
 ENGINES = ("exudyn", "mujoco")
 SEED, GRAVITY, SPEED = 2211, 9.81, 20.0
-NONLINEAR = "quarter_car_nonlinear"
+NONLINEAR_VEHICLE = "quarter_car_nonlinear"
 STEP, RUN_DURATION, SKIPPED_SECONDS = 2.5e-3, 24.0, 4.0
 """Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
 NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
@@ -33,19 +33,19 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 
 
 @cache
-def ride(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
+def vehicle_and_road(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
     """A shipped vehicle and a road of ``level`` times the paper's; a vehicle without a track width has one track."""
     vehicle = replace(load_vehicle(name), gravity=gravity)
-    return vehicle, paper_road(wheels(vehicle), level=level * LEVEL)
+    return vehicle, paper_road(wheels(vehicle), level=level * TRACK_DENSITY_LEVEL)
 
 
 def bent_in_engines(quick: bool) -> list[Row]:
     """Rows: the nonlinear quarter car under gravity in both engines, and its mean travel, which the asymmetric damper
     shifts."""
-    vehicle, excitation_ = ride(NONLINEAR)
+    vehicle, excitation_ = vehicle_and_road(NONLINEAR_VEHICLE)
     road = road_path(excitation_, SPEED, NONLINEAR_STEP)
     runs = {
-        engine: ridden(
+        engine: drive_over_road(
             engine,
             vehicle,
             road,
@@ -56,7 +56,9 @@ def bent_in_engines(quick: bool) -> list[Row]:
         )
         for engine in ENGINES
     }
-    rows = [_engine_difference_row("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
+    rows = [
+        _engine_difference_row("bent", f"{NONLINEAR_VEHICLE} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)
+    ]
     if quick:
         return rows
     linear = statistically_linear(vehicle, excitation_, SPEED)
@@ -74,7 +76,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
                 float(shift),
                 "",
             ).at_most(
-                promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
+                promised_error(left[travel]) + 4.0 * float(error[travel] / size[travel]),
                 "what its sentence promises, and 4 standard errors",
                 "none",
             )
@@ -103,14 +105,14 @@ def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
 def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     """Rows: a vehicle with 19 freedoms under gravity on one random road; variances and means in both engines against
     the covariance."""
-    vehicle, excitation_ = ride("r19_ride")
+    vehicle, excitation_ = vehicle_and_road("r19_ride")
     road = road_path(excitation_, SPEED, STEP)
     runs = {
-        engine: ridden(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, stride=2)
+        engine: drive_over_road(engine, vehicle, road, RUN_DURATION, seed=SEED, skipped=SKIPPED_SECONDS, stride=2)
         for engine in ENGINES
     }
     linear = linearise(vehicle)
-    exact = stationary(excited(linear, excitation_, SPEED))
+    exact = stationary_covariance(vehicle_with_road(linear, excitation_, SPEED))
     errors = standard_errors(linear, excitation_, SPEED, RUN_DURATION - SKIPPED_SECONDS)
     rows = [_engine_difference_row("r19_ride", f"r19_ride under gravity, {RUN_DURATION:g} s", runs)]
     for engine, run in runs.items():
@@ -134,10 +136,10 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
                 "",
             ).at_most(4.0, "the road has no mean, and gravity is carried", "none"),
         ]
-    return rows, _spectra(runs, linear, excitation_)
+    return rows, _spectral_densities(runs, linear, excitation_)
 
 
-def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
+def _spectral_densities(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
     """One-sided spectral densities over Hz of some outputs: by the covariance's model, and by Welch's method for each
     engine's run."""
     frequency = np.geomspace(0.2, 40.0, 300)
@@ -156,7 +158,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot spectra of both engines' runs over the model's own."""
     if not data["spectra"]:
         return []
-    from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, heading, legend_below, subplots
+    from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, add_heading, legend_below, subplots
 
     shown = data["spectra"]
     units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
@@ -178,7 +180,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for axis in axes[1]:
         axis.set_xlabel("frequency [Hz]")
     legend_below(figure, axes[0, 0])
-    heading(figure, f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
+    add_heading(figure, f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
     caption = (
         "Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
         "method; black, what the covariance's own linear vehicle and road say."

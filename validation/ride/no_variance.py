@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from models.ride.closed_forms import QuarterCar
-from models.ride.covariance import FINITE, stationary
-from models.ride.excited import DelayedSystem, excited
-from models.ride.frequency import quadrature, spectra
+from models.ride.covariance import FINITE, stationary_covariance
+from models.ride.excited import DelayedSystem, vehicle_with_road
+from models.ride.frequency import spectral_densities, variances_by_quadrature
 from models.ride.marginal import Unstable, split_marginal
-from models.ride.weighting import WEIGHTINGS, weighted
+from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Observed, Row, System, behaves
-from validation.ride.rides import corners, off, one_track, paper_road, twin
+from validation.common.rows import Observed, Row, System, behaviour_row
+from validation.ride.rides import changed_vehicle, largest_relative_error, one_track, paper_road, quarter_car_vehicle
 
 SYSTEM: System = "ride"
 CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
@@ -22,11 +22,13 @@ CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 def weighting_rows(seed: int) -> list[Row]:
     """Rows on frequency-weighted seat accelerations of an asymmetric vehicle: by filter states, compared with the
     frequency response."""
-    vehicle = linearise(twin(load_vehicle("r19_ride"), seed))
+    vehicle = linearise(changed_vehicle(load_vehicle("r19_ride"), seed))
     road, rows = paper_road(vehicle.wheels), []
     for name in ("Wk", "Wd"):
-        deviation = stationary(weighted(excited(vehicle, road, 20.0), {"left occupant": name})).deviation[-1]
-        integrals = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
+        deviation = stationary_covariance(
+            system_with_weightings(vehicle_with_road(vehicle, road, 20.0), {"left occupant": name})
+        ).deviation[-1]
+        integrals = variances_by_quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
         at = vehicle.names.index("left occupant")
         rows.append(
             Observed(
@@ -48,11 +50,11 @@ def without_variance() -> list[Row]:
 
 def _white_rows() -> list[Row]:
     """Rows on damped tyres: outputs without finite variance are reported with the reason, and the others are right."""
-    vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
-    covariance = stationary(excited(vehicle, one_track((0.0,), 0.3), 20.0))
-    other = quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
+    vehicle = quarter_car_vehicle([(0.0, CORNER)], tyre_damping=100.0)
+    covariance = stationary_covariance(vehicle_with_road(vehicle, one_track((0.0,), 0.3), 20.0))
+    other = variances_by_quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
     rows = [
-        behaves(
+        behaviour_row(
             f"ride_covariance.white.{name}",
             SYSTEM,
             f"tyre damping under a road of first order: {what}",
@@ -72,7 +74,7 @@ def _white_rows() -> list[Row]:
             "ride_covariance.white.value",
             SYSTEM,
             "difference of the outputs that stay finite from quadrature",
-            off(covariance.variance[:4], other.variance[:4]),
+            largest_relative_error(covariance.variance[:4], other.variance[:4]),
             "",
         ).at_most(1e-10, "both routes at their best", "native"),
     ]
@@ -84,23 +86,23 @@ def _free_rows() -> list[Row]:
     free = load_vehicle("r19_free")
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)
-    system = excited(vehicle, road, 20.0)
-    split, covariance = split_marginal(system.A), stationary(system)
+    system = vehicle_with_road(vehicle, road, 20.0)
+    split, covariance = split_marginal(system.A), stationary_covariance(system)
     same = np.array_equal(_with_slycot(system), covariance.variance)
     steer = {"fl": 0.05, "fr": 0.05}
     forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)
     turning = linearise(replace(free, side_forces=forces), 20.0)
-    walking = stationary(excited(turning, road, 20.0))
+    walking = stationary_covariance(vehicle_with_road(turning, road, 20.0))
     side = walking.names.index("lateral position")
     others = {status for i, status in enumerate(walking.status) if i != side}
     rate, after = walking.rate[side], float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
     omega = 1e-3  # a place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies
-    density = spectra(turning, road, 20.0, np.array([omega]))[0, side]
+    density = spectral_densities(turning, road, 20.0, np.array([omega]))[0, side]
     return [
         Observed(
             "ride_covariance.free.zeros", SYSTEM, "number of zero eigenvalues of R19-free", split.zeros, ""
         ).within(3, 0, "place along and across, heading", "closed form"),
-        behaves(
+        behaviour_row(
             "ride_covariance.free.status",
             SYSTEM,
             "variance of all outputs of R19-free",
@@ -108,7 +110,7 @@ def _free_rows() -> list[Row]:
             FINITE,
             covariance.reason[0],
         ),
-        behaves(
+        behaviour_row(
             "ride_covariance.free.slycot",
             SYSTEM,
             "R19-free gives the same bits where slycot seems installed",
@@ -116,7 +118,7 @@ def _free_rows() -> list[Row]:
             "same",
             "the method is named; its routines would raise here",
         ),
-        behaves(
+        behaviour_row(
             "ride_covariance.free.steered",
             SYSTEM,
             "front roll steer 0.05: variance of the lateral position",
@@ -150,7 +152,7 @@ def _with_slycot(system: DelayedSystem) -> np.ndarray:
     kept = installed.slycot_installed, solvers.sb03md, solvers.sb04md
     installed.slycot_installed, solvers.sb03md, solvers.sb04md = True, None, None
     try:
-        return stationary(system).variance
+        return stationary_covariance(system).variance
     finally:
         installed.slycot_installed, solvers.sb03md, solvers.sb04md = kept
 
@@ -158,9 +160,11 @@ def _with_slycot(system: DelayedSystem) -> np.ndarray:
 def _unstable_row() -> Row:
     said, why = "answered", "it swings up"
     try:
-        stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), one_track((0.0,), 0.3), 20.0))
+        stationary_covariance(
+            vehicle_with_road(quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))]), one_track((0.0,), 0.3), 20.0)
+        )
     except Unstable as error:
         why = str(error)
         said = "refused" if "swings at 11.8" in why and "grows" in why else "refused without its mode"
     what = "a quarter car with a damper of -5 N s/m"
-    return behaves("ride_covariance.unstable", SYSTEM, what, said, "refused", why)
+    return behaviour_row("ride_covariance.unstable", SYSTEM, what, said, "refused", why)

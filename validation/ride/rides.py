@@ -13,11 +13,19 @@ from numpy.typing import ArrayLike
 
 from models.ride.closed_forms import QuarterCar
 from models.road.excitation import Excitation
-from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.road.two_track import (
+    CORRELATION_CASES,
+    TRACK_DENSITY_LEVEL,
+    TwoTrackRoad,
+    half_track,
+    on_track,
+    road_excitation,
+    road_of_level,
+)
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
 
-INTENSITY = 1e-4
+ROAD_INTENSITY = 1e-4
 """Of the road of one track, m^2 per m."""
 R19_FREQUENCIES = (
     1.357622,
@@ -41,7 +49,7 @@ R19_FREQUENCIES = (
     15.535278,
 )
 """|lambda| / 2 pi (Hz) of R19-ride, given with its data."""
-STANDARD = (
+STANDARD_WEIGHTINGS = (
     (0.5, 418, 853),
     (0.63, 459, 944),
     (0.8, 477, 992),
@@ -69,7 +77,7 @@ STANDARD = (
 """ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 
 
-def off(values: ArrayLike, expected: ArrayLike) -> float:
+def largest_relative_error(values: ArrayLike, expected: ArrayLike) -> float:
     """Largest relative error of values against expected ones."""
     return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
 
@@ -77,27 +85,27 @@ def off(values: ArrayLike, expected: ArrayLike) -> float:
 def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
     """One track under axles at positions ``places`` (m); its height obeys z' = -corner z + w with white noise w."""
     heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
-    filter_ = np.array([[-corner]]), np.array([[INTENSITY**0.5]])
+    filter_ = np.array([[-corner]]), np.array([[ROAD_INTENSITY**0.5]])
     return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
 
 
 def paper_road(
-    wheels: Sequence[WheelPosition], *words: str, level: float = LEVEL, cutoff: float | None = None
+    wheels: Sequence[WheelPosition], *words: str, level: float = TRACK_DENSITY_LEVEL, cutoff: float | None = None
 ) -> Excitation:
     """The paper's road under wheels, with a case of correlation in words; wheels without a track width have one
     track."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
-    return excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
+    return road_excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
 
 
 def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
     """The paper's road, or another one, in the paper's five cases of correlation, by their numbers."""
     road = road or road_of_level(half_track(wheels))
-    return {str(number): excitation(road, wheels, *case) for number, case in CASES.items()}
+    return {str(number): road_excitation(road, wheels, *case) for number, case in CORRELATION_CASES.items()}
 
 
-def corners(
+def quarter_car_vehicle(
     places: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
 ) -> LinearVehicle:
     """Linear vehicle of quarter-car corners (x in m, quarter car), one per axle, under a body with a mass matrix of
@@ -132,16 +140,16 @@ def corners(
     return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
 
 
-SHARE = 0.2
+LARGEST_CHANGE = 0.2
 """Largest change of any value."""
 
 
-def twin(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
-    """The vehicle with its masses, stiffnesses and dampings changed by up to SHARE each, named a twin."""
+def changed_vehicle(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
+    """The vehicle with its masses, stiffnesses and dampings changed by up to LARGEST_CHANGE each, named a twin."""
     rng = np.random.default_rng(seed)
 
     def changed(value: float) -> float:
-        return value * (1 + SHARE * rng.uniform(-1, 1))
+        return value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
 
     bodies = []
     for body in vehicle.bodies:

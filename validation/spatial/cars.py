@@ -13,7 +13,7 @@ from models.multibody import forces as at
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.multibody.numbers import Handling
-from models.tyre.bristles import brush
+from models.tyre.bristles import brush_forces
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.spatial import Curve, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
@@ -64,14 +64,14 @@ def rough_car() -> CutVehicle:
     return cut(replace(whole, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
-def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
+def static_forces(vehicle: CutVehicle, rows: int, frame: str = "hub") -> HubInputs:
     """Hub forces (rows) that carry the vehicle at rest."""
     forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
     forces[:, 2::WRENCH] = vehicle.loads
     return HubInputs(forces, frame)
 
 
-def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def random_states(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Random coordinates and rates, with the chassis at any heading and with roll and pitch up to 1 rad."""
     rng = np.random.default_rng(seed)
     q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
@@ -79,10 +79,10 @@ def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
+def random_wrenches(vehicle: CutVehicle, frame: str, guide: bool) -> HubInputs:
     """Random forces and moments on every hub, with or without a prescribed attitude (``guide``)."""
     rng = np.random.default_rng(SEED)
-    hub_inputs = static(vehicle, 3, frame)
+    hub_inputs = static_forces(vehicle, 3, frame)
     hubs = hub_inputs.hubs + rng.normal(0, 500.0, hub_inputs.hubs.shape[1])
     return replace(hub_inputs, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
 
@@ -111,19 +111,19 @@ def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
         n = handling.tyre_numbers(i)
         half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
         slides = np.array([[0, slip, 0, 1.0]])
-        force = brush(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], slides)[0, 1]
+        force = brush_forces(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], slides)[0, 1]
         worst = max(worst, abs(float(-force / slip) / wanted[tyre.name] - 1.0))
     return worst
 
 
-def mirrored(handling: Handling, values: np.ndarray) -> np.ndarray:
+def mirrored_coordinates(handling: Handling, values: np.ndarray) -> np.ndarray:
     """Values (..., n) of a car's coordinates in its mirror image, with left and right exchanged."""
     places = handling.vehicle.coordinates()
-    swap = [places.index((_opposite(name), freedom)) for name, freedom in places]
+    swap = [places.index((_opposite_body(name), freedom)) for name, freedom in places]
     return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places]) * values[..., swap]
 
 
-def _opposite(name: str) -> str:
+def _opposite_body(name: str) -> str:
     """Name of the corresponding body on the other side of the car."""
     for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
         for side, opposite in ((left, right), (right, left)):

@@ -15,7 +15,7 @@ from models.multibody.plain.motion import PLACE, Bodies
 from models.systems.hub_forces.measurement import HubForces
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from validation.common.rows import Observed, Row, System
-from validation.spatial.cars import anywhere, static
+from validation.spatial.cars import random_states, static_forces
 from validation.spatial.written_equations import FRAMES
 
 SEED, SAMPLES, STEP, STEPS_PER_SAMPLE = 37, 12, 2e-3, 4
@@ -74,7 +74,7 @@ def settings(integrator: str = FIXED) -> Settings:
 
 def samples(vehicle: CutVehicle) -> HubForces:
     """Hub force samples in axes fixed in space: static loads with random parts of 400 N and 40 N m."""
-    rest = static(vehicle, SAMPLES, "inertial")
+    rest = static_forces(vehicle, SAMPLES, "inertial")
     deviations = np.tile([400.0] * 3 + [40.0] * 3, len(vehicle.hubs))
     return HubForces(rest.hubs, STEPS_PER_SAMPLE * STEP, "inertial").noisy(deviations, SEED)
 
@@ -83,11 +83,11 @@ def centre_gap(vehicle: CutVehicle, engine: str, interpolation: str, integrator:
     """Largest error (m) of the centre of mass at the sample times, against the closed form, over all axes."""
     forces, how = samples(vehicle), settings(integrator)
     run = HubModel(engine, vehicle, forces.hub_inputs(STEP, how.steps, interpolation), how).run()  # type: ignore[arg-type]
-    moved = centres(vehicle, run.positions[::STEPS_PER_SAMPLE])
-    return float(np.abs(moved - moved[0] - _fallen(vehicle, forces, interpolation == "held")).max())
+    moved = centres_of_mass(vehicle, run.positions[::STEPS_PER_SAMPLE])
+    return float(np.abs(moved - moved[0] - _falling_path(vehicle, forces, interpolation == "held")).max())
 
 
-def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
+def centres_of_mass(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
     """Centre of mass (m, 3) in m of all bodies at coordinates (m, n)."""
     bodies, tree = vehicle.tree.bodies, Bodies(vehicle.tree)
     points, masses = tree.points([(body.name, body.position) for body in bodies]), [body.mass for body in bodies]
@@ -95,7 +95,7 @@ def centres(vehicle: CutVehicle, positions: np.ndarray) -> np.ndarray:
     return np.array([np.average(each, axis=0, weights=masses) for each in places])
 
 
-def _fallen(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
+def _falling_path(vehicle: CutVehicle, forces: HubForces, hold_samples: bool) -> np.ndarray:
     """Path (samples, 3) of a point mass, with the vehicle's mass, under weight and the sum of all hub forces, from
     rest."""
     mass, period = sum(body.mass for body in vehicle.tree.bodies), forces.period
@@ -112,11 +112,11 @@ def instants_gap(vehicle: CutVehicle, count: int) -> float:
     and guides that are interpolated between their rows."""
     rng, rows, worst = np.random.default_rng(SEED), 7, 0.0
     for i in range(count):
-        hubs = static(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
+        hubs = static_forces(vehicle, rows).hubs + rng.normal(0.0, 500.0, (rows, WRENCH * len(vehicle.hubs)))
         hub_inputs = HubInputs(hubs, FRAMES[i % 3], guide=rng.normal(0.0, 0.1, (rows, 6)))
         how = Settings("DOP853", STEP, (rows // 2) * STEP)
         compiled, plain = (HubModel(engine, vehicle, hub_inputs, how) for engine in ("reference", PLAIN))
-        state, time = anywhere(vehicle, i), rng.uniform(0.0, how.duration)
+        state, time = random_states(vehicle, i), rng.uniform(0.0, how.duration)
         expected = plain.acceleration(time, *state)
         gap = np.abs(compiled.acceleration(time, *state) - expected).max() / np.abs(expected).max()
         worst = max(worst, float(gap))

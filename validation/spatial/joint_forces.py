@@ -12,13 +12,13 @@ import numpy as np
 
 from models.engines.mujoco_quiet import without_warnings
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
-from models.systems.measured.sections import guided
+from models.systems.measured.sections import guided_bodies
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
 
 STEP, STEPS = 3e-5, 4
 """Of Exudyn (s): rounding of positions by the square of a step, and motion in it, cost a millionth each."""
-SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+MULTIPLIER_SIGNS = np.array([-1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Exudyn's multipliers of a generic joint, as forces and moments on its second body."""
 
 
@@ -53,7 +53,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
         loads = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
         for kind, load in zip((items.LoadForceVector, items.LoadTorqueVector), loads, strict=True):
             mbs.AddLoad(kind(markerNumber=centres[body.name], loadVector=load.tolist()))
-    for body in (vehicle.uncut.body(name) for name in guided(vehicle)):
+    for body in (vehicle.uncut.body(name) for name in guided_bodies(vehicle)):
         assert body.parent is not None
         arm = np.subtract(body.position, vehicle.uncut.body(body.parent).position)
         seat = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.parent], localPosition=arm.tolist()))
@@ -75,7 +75,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode, ti.generalizedAlpha.spectralRadius = STEPS, STEPS * STEP, 0, 0.0
     mbs.SolveDynamic(options)
-    return np.hstack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors]).reshape(-1, 6) * SIGNS
+    return np.hstack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors]).reshape(-1, 6) * MULTIPLIER_SIGNS
 
 
 class _Loaded:
@@ -84,7 +84,7 @@ class _Loaded:
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
         self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
         names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
-        for number in (names[name] for name in guided(vehicle)):
+        for number in (names[name] for name in guided_bodies(vehicle)):
             spec.body(number).add_site(name=number)
             for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
                 spec.add_sensor(name=f"{kind} {number}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=number)

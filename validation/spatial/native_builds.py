@@ -9,9 +9,9 @@ from models.engines.cut_vehicle import HubModel, Route, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
-from validation.spatial.cars import static
+from validation.spatial.cars import static_forces
 
-NATIVE = ("exudyn", "mujoco")
+NATIVE_ENGINES = ("exudyn", "mujoco")
 SEED, STEP = 37, 1e-3
 State = tuple[np.ndarray, np.ndarray]
 
@@ -28,11 +28,11 @@ def random_states(vehicle: CutVehicle, count: int) -> list[State]:
 
 def shaken_drive(vehicle: CutVehicle, rows: int) -> HubInputs:
     """Input of static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
-    rest = static(vehicle, rows)
+    rest = static_forces(vehicle, rows)
     return replace(rest, hubs=rest.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, rest.hubs.shape))
 
 
-def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
+def hub_model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
     """The vehicle with random hub forces in an engine, built natively or with compiled forces (``route``)."""
     return build(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
 
@@ -40,23 +40,23 @@ def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> Hub
 def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
     """Largest difference between accelerations of a native build and by compiled forces, relative to each coordinate's
     largest."""
-    native, compiled = model(engine, vehicle, "native"), model("mujoco", vehicle, "compiled")
-    return _difference([[each.acceleration(0.0, *state) for state in states] for each in (native, compiled)])
+    native, compiled = hub_model(engine, vehicle, "native"), hub_model("mujoco", vehicle, "compiled")
+    return _relative_difference([[each.acceleration(0.0, *state) for state in states] for each in (native, compiled)])
 
 
 def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
     """Largest relative difference between accelerations by compiled forces and by ``SpatialReference``, which share no
     code, without hub forces."""
-    still = HubInputs(0.0 * static(vehicle, 3).hubs)
-    compiled, equations = build("reference", vehicle, still, STEP, STEP), written(vehicle)
+    still = HubInputs(0.0 * static_forces(vehicle, 3).hubs)
+    compiled, equations = build("reference", vehicle, still, STEP, STEP), hand_written_equations(vehicle)
     paths = [
         [compiled.acceleration(0.0, *state) for state in states],
         [equations.acceleration(0.0, *state) for state in states],
     ]
-    return _difference(paths)
+    return _relative_difference(paths)
 
 
-def written(vehicle: CutVehicle) -> SpatialReference:
+def hand_written_equations(vehicle: CutVehicle) -> SpatialReference:
     """Hand-written equations of a cut vehicle without hub forces: bodies with springs, anti-roll bars, preloads and
     weight."""
     whole = vehicle.uncut
@@ -68,11 +68,11 @@ def written(vehicle: CutVehicle) -> SpatialReference:
 
 def path_error(engine: str, vehicle: CutVehicle, steps: int) -> float:
     """Largest difference (m, rad, m/s, rad/s) between the states of a native run and of one with compiled forces."""
-    native = model(engine, vehicle, "native", steps).run()
-    compiled = model("mujoco", vehicle, "compiled", steps).run()
+    native = hub_model(engine, vehicle, "native", steps).run()
+    compiled = hub_model("mujoco", vehicle, "compiled", steps).run()
     return float(np.abs(native.states - compiled.states).max())
 
 
-def _difference(rows: list[list[np.ndarray]]) -> float:
+def _relative_difference(rows: list[list[np.ndarray]]) -> float:
     computed, wanted = map(np.array, rows)
     return float((np.abs(computed - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.sensors.rigid_body_motion import Start
-from models.sensors.rotations import from_cardan, matrix, skew
+from models.sensors.rigid_body_motion import StartState
+from models.sensors.rotations import from_cardan, rotation_matrix, skew_matrix
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 Places = dict[str, tuple[float, float, float]]
@@ -21,7 +21,7 @@ class Path:
     orientation: np.ndarray
     acceleration: np.ndarray
     position: np.ndarray
-    start: Start
+    start: StartState
     period: float
 
 
@@ -33,7 +33,7 @@ def path(count: int = 2001, period: float = 1e-3) -> Path:
     derivative: nothing of the algorithm under test is used.
     """
     t = period * np.arange(count)
-    angles, speeds, changes = _waves(t, np.array([[0.3, 1.7, 0.2], [0.25, 2.3, 0.9], [0.6, 0.8, 0.4]]))
+    angles, speeds, changes = _sine_waves(t, np.array([[0.3, 1.7, 0.2], [0.25, 2.3, 0.9], [0.6, 0.8, 0.4]]))
     (roll, pitch, yaw), (droll, dpitch, _) = angles.T, speeds.T
     ones, none = np.ones_like(t), np.zeros_like(t)
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
@@ -52,12 +52,12 @@ def path(count: int = 2001, period: float = 1e-3) -> Path:
     rates = np.einsum("nij,nj->ni", turn, speeds)
     alpha = np.einsum("nij,nj->ni", change, speeds) + np.einsum("nij,nj->ni", turn, changes)
     orientation = from_cardan(roll, pitch, yaw)
-    places, velocities, accelerations = _waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
+    places, velocities, accelerations = _sine_waves(t, np.array([[1.0, 1.1, 0.0], [0.5, 1.9, 0.7], [0.1, 5.0, 0.3]]))
     rows = (tuple(values[0].tolist()) for values in (rates, orientation, velocities, places))
-    return Path(alpha, rates, orientation, accelerations, places, Start(*rows), period)
+    return Path(alpha, rates, orientation, accelerations, places, StartState(*rows), period)
 
 
-def _waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sine_waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sine waves (n, 3) and their first two derivatives; shapes: rows of amplitude, angular frequency and phase."""
     size, speed, phase = shapes.T
     angle = np.outer(t, speed) + phase
@@ -67,28 +67,28 @@ def _waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 PATH = path()
 
 
-def readings(places: np.ndarray, motion: Path = PATH) -> np.ndarray:
+def sensor_readings(places: np.ndarray, motion: Path = PATH) -> np.ndarray:
     """Specific forces (n, sensors, 3) in m/s^2 that sensors at local positions (sensors, 3) in m read, by eqs (16) and
     (17)."""
-    lever = skew(motion.alpha) + skew(motion.rates) @ skew(motion.rates)
-    felt = np.einsum("nji,nj->ni", matrix(motion.orientation), motion.acceleration - GRAVITY)
+    lever = skew_matrix(motion.alpha) + skew_matrix(motion.rates) @ skew_matrix(motion.rates)
+    felt = np.einsum("nji,nj->ni", rotation_matrix(motion.orientation), motion.acceleration - GRAVITY)
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(places))
 
 
-def tilted(height: float, turn: np.ndarray) -> Places:
+def tilted_sensors(height: float, turn: np.ndarray) -> Places:
     """Positions of five sensors, rotated and shifted: four at the corners of a floor of 2 m by 1.2 m, and one above its
     middle."""
     floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
     return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ turn.T)}
 
 
-TURN = matrix(from_cardan(0.3, 0.4, 0.5))
-ARRAYS: dict[str, Places] = {
+TURN = rotation_matrix(from_cardan(0.3, 0.4, 0.5))
+SENSOR_ARRANGEMENTS: dict[str, Places] = {
     "4": {"s1": (1, 0.6, 0), "s2": (1, -0.6, 0.5), "s3": (-1, 0.6, 0), "s4": (-1, -0.6, -0.5)},
-    "5, one 1 m up": tilted(1.0, np.eye(3)),
-    "5 in a plane": tilted(0.0, np.eye(3)),
-    "5 in a tilted plane": tilted(0.0, TURN),
-    "5, one 3 cm up": tilted(0.03, np.eye(3)),
+    "5, one 1 m up": tilted_sensors(1.0, np.eye(3)),
+    "5 in a plane": tilted_sensors(0.0, np.eye(3)),
+    "5 in a tilted plane": tilted_sensors(0.0, TURN),
+    "5, one 3 cm up": tilted_sensors(0.03, np.eye(3)),
     "3": {"s1": (1.1, 0, -0.2), "s2": (-0.9, 0.6, -0.2), "s3": (-0.9, -0.6, 0.3)},
 }
 """Arrangements that the exact rows and tests go through."""

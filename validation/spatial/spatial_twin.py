@@ -27,7 +27,7 @@ SMALL_INERTIA = ((9.0, 0.5, -1.0), (0.5, 12.0, 0.7), (-1.0, 0.7, 14.0))
 FRONT_LEFT, FRONT_RIGHT = (1.2, 0.7, 0.33), (1.25, -0.72, 0.33)
 UP: Vector = (0.0, 0.0, 1.0)
 STEEP_AXIS, FLAT_AXIS = (np.sin(0.07), 0.0, np.cos(0.07)), (np.cos(0.07), 0.0, -np.sin(0.07))
-SKEW = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
+SKEW_DIRECTION = tuple(np.array([0.3, -0.2, 0.9]) / np.sqrt(0.94))
 """A direction along no axis of anything."""
 
 
@@ -36,13 +36,13 @@ def vehicle(gravity: float = 0.0) -> SpatialVehicle:
     return SpatialVehicle(
         "spatial twin",
         _bodies(),
-        _springs(),
+        _twin_springs(),
         _tyres(),
         (1.2, -1.4),
-        _bars(),
+        _twin_bars(),
         _side_forces(),
         (Drag("body", 1.0),),
-        _outputs(),
+        _twin_outputs(),
         gravity,
     )
 
@@ -61,30 +61,30 @@ def _bodies() -> tuple[Body, ...]:
     )
 
 
-def _spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k: float, c: float) -> SpringDamper:
+def _twin_spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k: float, c: float) -> SpringDamper:
     return SpringDamper(name, from_body, two, point, point, axis, k, c)
 
 
-def _springs() -> tuple[SpringDamper, ...]:
+def _twin_springs() -> tuple[SpringDamper, ...]:
     """Springs of the twin: suspensions; then mounts along three orthogonal skew axes; then seats."""
     suspensions = (
-        _spring("spring fl", "body", "fl", FRONT_LEFT, STEEP_AXIS, 2.0e4, 1500.0),
-        _spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP_AXIS, 2.2e4, 1400.0),
+        _twin_spring("spring fl", "body", "fl", FRONT_LEFT, STEEP_AXIS, 2.0e4, 1500.0),
+        _twin_spring("spring fr", "body", "fr", FRONT_RIGHT, STEEP_AXIS, 2.2e4, 1400.0),
         SpringDamper("spring rl", "body", "axle", (-1.4, 0.5, 0.7), (-1.4, 0.5, 0.35), UP, 2.0e4, 1500.0),
         SpringDamper("spring rr", "body", "axle", (-1.4, -0.6, 0.7), (-1.4, -0.6, 0.35), UP, 1.9e4, 1600.0),
-        _spring("bush fl", "body", "fl", FRONT_LEFT, FLAT_AXIS, 2.0e5, 900.0),
-        _spring("bush fr", "body", "fr", FRONT_RIGHT, FLAT_AXIS, 2.1e5, 800.0),
+        _twin_spring("bush fl", "body", "fl", FRONT_LEFT, FLAT_AXIS, 2.0e5, 900.0),
+        _twin_spring("bush fr", "body", "fr", FRONT_RIGHT, FLAT_AXIS, 2.1e5, 800.0),
     )
-    skew = np.linalg.qr(np.array([SKEW, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]).T)[0].T
+    skew = np.linalg.qr(np.array([SKEW_DIRECTION, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]).T)[0].T
     mounts = tuple(
-        _spring(f"mount {i}{j}", "engine", "body", (x, y, 0.45), tuple(axis), 9.0e4 + 1e4 * i, 300.0)
+        _twin_spring(f"mount {i}{j}", "engine", "body", (x, y, 0.45), tuple(axis), 9.0e4 + 1e4 * i, 300.0)
         for i, (x, y) in enumerate(((1.1, 0.3), (1.1, -0.25), (0.3, 0.02)))
         for j, axis in enumerate(skew.tolist())
     )
     riders = (
-        _spring("pump", "pump", "engine", (1.3, 0.1, 0.5), UP, 5.0e4, 200.0),
-        _spring("hub", "hub", "axle", (-1.1, 0.6, 0.5), UP, 4.0e4, 150.0),
-        _spring("lid", "lid", "body", (1.4, 0.2, 0.6), SKEW, 5.0e3, 20.0),
+        _twin_spring("pump", "pump", "engine", (1.3, 0.1, 0.5), UP, 5.0e4, 200.0),
+        _twin_spring("hub", "hub", "axle", (-1.1, 0.6, 0.5), UP, 4.0e4, 150.0),
+        _twin_spring("lid", "lid", "body", (1.4, 0.2, 0.6), SKEW_DIRECTION, 5.0e3, 20.0),
     )
     return suspensions + mounts + riders
 
@@ -98,7 +98,7 @@ def _tyres() -> tuple[Tyre, ...]:
     )
 
 
-def _bars() -> tuple[AntiRollBar, ...]:
+def _twin_bars() -> tuple[AntiRollBar, ...]:
     return (
         AntiRollBar("front bar", "body", "fl", "fr", FRONT_LEFT, FRONT_RIGHT, 6000.0, 20.0),
         AntiRollBar("rear bar", "body", "axle", "axle", (-1.4, 0.4, 0.35), (-1.4, -0.4, 0.35), 2000.0),
@@ -109,7 +109,7 @@ def _side_forces() -> tuple[SideForce, ...]:
     return (SideForce("rear left", "axle", (-1.4, 0.7, 0.0), "body", 5.0e4, 0.05),)
 
 
-def _outputs() -> tuple[PointOutput | TurnOutput | PartOutput | TyreOutput, ...]:
+def _twin_outputs() -> tuple[PointOutput | TurnOutput | PartOutput | TyreOutput, ...]:
     return (
         PointOutput("lid", "acceleration", "lid", (1.0, 0.2, 1.0), UP),
         TurnOutput("pump", "angular velocity", "pump", (0.0, 1.0, 0.0)),

@@ -33,10 +33,10 @@ def levers_error() -> float:
     free, (towed,) = car.vehicle, car.vehicle.towed
     loads = [sum(car.held.tyres[tyre.name] for tyre in free.tyres if tyre.axle == i) for i in range(3)]
     loads.append(hitch_load(free, car.held, towed))
-    return max(abs(load / lever - 1.0) for load, lever in zip(loads, levers(car), strict=True))
+    return max(abs(load / lever - 1.0) for load, lever in zip(loads, loads_and_lengths(car), strict=True))
 
 
-def levers(car: Handling) -> list[float]:
+def loads_and_lengths(car: Handling) -> list[float]:
     """Loads (N) of a car's front and rear axle, of the caravan's axle and of the ball, by the balance of moments.
 
     About the ball for the caravan; about the front axle for the car, with the caravan's load on the ball.
@@ -69,12 +69,12 @@ def towed_turn(
         if change is not None:
             change(car)
         turns.append(drive_run("mujoco", car, speed, duration))
-    left, right = (np.array([turn.velocity()[-1, 2], *headings(turn)]) for turn in turns)
+    left, right = (np.array([turn.velocity()[-1, 2], *final_headings(turn)]) for turn in turns)
     yaw, *towed = (left - right) / (2.0 * SMALL_STEER)
-    return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.headings)
+    return TurnErrors(float(yaw) / wanted.yaw_gain - 1.0, np.array(towed) - wanted.towed_headings)
 
 
-def headings(drive: Drive) -> list[float]:
+def final_headings(drive: Drive) -> list[float]:
     """Final heading (rad) of each towed body relative to the car: the sum of the yaw angles of all hitches between
     them."""
     free = drive.handling.vehicle
@@ -96,7 +96,7 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     hitch = car.vehicle.body(hitch_of(car.vehicle.towed[0])).position[0]
     radius, back, bar = (front - rear) / math.tan(steer), rear - hitch, hitch - axle
     wanted = math.atan(back / radius) + math.asin(bar / math.hypot(radius, back))
-    (angle,) = headings(drive_run("mujoco", car, speed, 8.0))
+    (angle,) = final_headings(drive_run("mujoco", car, speed, 8.0))
     return -angle / wanted - 1.0
 
 

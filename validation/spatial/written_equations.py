@@ -22,35 +22,35 @@ from models.road.iso8608 import iso8608_road
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import REFERENCE, build
 from models.systems.hub_forces.measurement import HubForces, two_tracks
-from models.tyre.bristles import brush
+from models.tyre.bristles import brush_forces
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
 from models.vehicles.spatial import Curve, SpatialVehicle, hitch_of
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import largest_relative_difference
-from validation.spatial.cars import anywhere, static, twin
+from validation.spatial.cars import random_states, static_forces, twin
 from validation.spatial.trains import caravan, train
 
 SEED, STEP, SPEED = 41, 1e-3, 22.0
 ROLLING_STEP = 2e-3
 """s, of a path on tyres; each evaluation by plain equations takes 5 ms."""
 FRAMES = ("hub", "body", "inertial")
-TILT = 0.3
+LARGEST_TILT = 0.3
 """rad, by which a chassis rolls and pitches at random."""
-FOLD = 1.5
+LARGEST_FOLD = 1.5
 """rad, by which a trailer yaws at random."""
-BUMP = Curve((-0.1, -0.02, 0.02, 0.1), (-4000.0, 0.0, 0.0, 6000.0))
-DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 150.0, 400.0))
-TURN = Controls(
+BUMP_STOP = Curve((-0.1, -0.02, 0.02, 0.1), (-4000.0, 0.0, 0.0, 6000.0))
+NONLINEAR_DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 150.0, 400.0))
+TURN_CONTROLS = Controls(
     steer=((0.0, 0.01), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)),
     brake=((0.0, 0.0), (0.4, 900.0)),
     drive=((0.0, 0.0), (0.2, 300.0)),
 )
 
 
-def curved() -> SpatialVehicle:
+def curved_vehicle() -> SpatialVehicle:
     """R19-free with a bump stop, a nonlinear damper and dry friction in each of its first springs."""
     car = load_vehicle("r19_free")
-    first = (replace(s, travel_force=BUMP, rate_force=DAMPER, friction=120.0) for s in car.springs[:4])
+    first = (replace(s, travel_force=BUMP_STOP, rate_force=NONLINEAR_DAMPER, friction=120.0) for s in car.springs[:4])
     return replace(car, springs=(*first, *car.springs[4:]))
 
 
@@ -60,11 +60,13 @@ def rolling_cars() -> dict[str, Handling]:
     waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
     gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
     return {
-        "r19_free": Handling(r19, Tyres(), TURN, waves),
-        "twin": Handling(twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN, waves, 0.05, (gust,)),
-        "curved": Handling(curved(), Tyres(spin_inertia=1.2), TURN, waves),
-        "caravan": Handling(caravan(), Tyres(inclination=0.02), TURN, waves),
-        "train": Handling(train(), Tyres(fixed=("fl", "dr", "bl"), cells=11), TURN, waves, 0.05, (gust,)),
+        "r19_free": Handling(r19, Tyres(), TURN_CONTROLS, waves),
+        "twin": Handling(
+            twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)
+        ),
+        "curved": Handling(curved_vehicle(), Tyres(spin_inertia=1.2), TURN_CONTROLS, waves),
+        "caravan": Handling(caravan(), Tyres(inclination=0.02), TURN_CONTROLS, waves),
+        "train": Handling(train(), Tyres(fixed=("fl", "dr", "bl"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)),
     }
 
 
@@ -79,7 +81,10 @@ def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarra
         speed = (0.0, 0.05, 25.0)[i % 3] * rng.uniform()
         q, v = rng.uniform(-0.03, 0.03, len(places)), rng.uniform(-0.5, 0.5, len(places))
         q[:3] = *rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.1, 3.1)
-        q[leans], q[folds] = rng.uniform(-TILT, TILT, len(leans)), rng.uniform(-FOLD, FOLD, len(folds))
+        q[leans], q[folds] = (
+            rng.uniform(-LARGEST_TILT, LARGEST_TILT, len(leans)),
+            rng.uniform(-LARGEST_FOLD, LARGEST_FOLD, len(folds)),
+        )
         ahead = car.straight(speed)[1]
         v = v * min(1.0, 0.1 + speed) + ahead
         v[:2] += speed * np.array([np.cos(q[2]) - 1.0, np.sin(q[2])])
@@ -126,7 +131,7 @@ def cut_cars() -> dict[str, CutVehicle]:
 def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
     """Inputs for comparison: random hub forces and moments in each frame, without guide, with a pulling and with a
     prescribing guide; and a road."""
-    rng, rows = np.random.default_rng(SEED), static(vehicle, 3).hubs
+    rng, rows = np.random.default_rng(SEED), static_forces(vehicle, 3).hubs
     hubs = rows + rng.normal(0.0, 500.0, rows.shape)
     guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
     wrenches = [HubInputs(hubs, frame, guide=held) for frame in FRAMES for held in (None, guide)]
@@ -135,10 +140,10 @@ def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
 
 
 def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random coordinates and rates (n,): any heading, roll and pitch by TILT, tyres near the road."""
-    q, v = anywhere(vehicle, seed)
+    """Random coordinates and rates (n,): any heading, roll and pitch by LARGEST_TILT, tyres near the road."""
+    q, v = random_states(vehicle, seed)
     q[Z] *= 2e-3
-    q[PITCH], q[ROLL] = TILT * q[PITCH], TILT * q[ROLL]
+    q[PITCH], q[ROLL] = LARGEST_TILT * q[PITCH], LARGEST_TILT * q[ROLL]
     return q, v
 
 
@@ -179,7 +184,9 @@ def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool)
     else:
         deviation = np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs))
         hub_inputs = (
-            HubForces(static(vehicle, steps + 1).hubs, STEP, "hub").noisy(deviation, SEED).hub_inputs(STEP, steps)
+            HubForces(static_forces(vehicle, steps + 1).hubs, STEP, "hub")
+            .noisy(deviation, SEED)
+            .hub_inputs(STEP, steps)
         )
     paths = [hub_model(name, vehicle, hub_inputs, STEP, duration).run().states for name in (engine, PLAIN)]
     return float(np.abs(paths[0] - paths[1]).max())
@@ -196,6 +203,6 @@ def bristles_gap(count: int) -> float:
         slides[:, 3] = rng.uniform(1.0, 40.0, 8) if i % 2 else rng.uniform(-0.3, 0.3, 8)
         ones = np.ones(len(slides))
         patch = Patch(half * ones, width * ones, load * ones, mu * ones, stiffness * ones)
-        gap = plain_tyre_forces(patch, slides, cells) - brush(load, mu, half, width, stiffness, slides, cells)
+        gap = plain_tyre_forces(patch, slides, cells) - brush_forces(load, mu, half, width, stiffness, slides, cells)
         worst = max(worst, float(np.abs(gap / (load * np.array([1.0, 1.0, width]))).max()))
     return worst

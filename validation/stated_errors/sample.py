@@ -15,7 +15,7 @@ class Sample:
     channel, empty where it states none; true : root mean square error against the truth, for the same channels and
     units.
 
-    calls, extra : force evaluations (cells, frequencies) of the run and of its estimate.
+    calls, extra_calls : force evaluations (cells, frequencies) of the run and of its estimate.
     """
 
     name: str
@@ -23,7 +23,7 @@ class Sample:
     told: Mapping[str, Estimate]
     true: Mapping[str, float]
     calls: float
-    extra: float
+    extra_calls: float
 
     @property
     def printed(self) -> str:
@@ -36,7 +36,7 @@ class Sample:
         return self.true[self.printed] / self.told[self.printed].error
 
 
-def drawn(
+def drawn_samples(
     count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
 ) -> Iterator[Sample]:
     """Samples from ``draw``, ``count`` of them; it is called again where a scene is refused, a run fails, or it gives

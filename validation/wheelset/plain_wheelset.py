@@ -61,7 +61,7 @@ def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
     return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, ahead, turning)
 
 
-def touch(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
+def contact_of_wheel(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
     """Contact of a conical wheel with its rail; side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
@@ -82,7 +82,7 @@ def touch(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
     return Touch(depth, normal, apex + way * inward - axle.centre, float(cosine / (2.0 * way * sine)))
 
 
-def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
+def hertz_force(depth: float, along: float, across: float, modulus: float) -> tuple[float, float, float]:
     """Force (N) and semi-axes along and across (m) at a penetration (m) by Hertz' theory, K. L. Johnson, Contact
     mechanics (1985), eqs (4.26) to (4.33); curvatures of z = along x^2 + across y^2 (1/m), modulus E* (Pa)."""
     if depth <= 0.0:
@@ -100,7 +100,7 @@ def pressed(depth: float, along: float, across: float, modulus: float) -> tuple[
     return float(force), *((long, short) if along <= across else (short, long))
 
 
-def creeping(
+def creep_forces(
     wheelset: Wheelset, contact: tuple[float, float, float], slip: np.ndarray, law: str, cells: int
 ) -> np.ndarray:
     """Creep forces (N) and moment (N m) of a contact (load, a, b) at creepages and spin (3,)."""
@@ -115,20 +115,20 @@ def creeping(
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
+def patch_forces(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
     """Force and moment of one rail on the wheelset."""
-    w, speed, at = wheelset, axle.velocity[0], touch(wheelset, side, axle)
+    w, speed, at = wheelset, axle.velocity[0], contact_of_wheel(wheelset, side, axle)
     across = np.cross(at.normal, np.array([1.0, 0.0, 0.0]))
     velocity = axle.velocity + np.cross(axle.turning, at.place)
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ at.normal]), velocity @ at.normal
-    elastic, a, b = pressed(at.depth, at.along, 0.5 / w.head_radius, w.pair.modulus)
+    elastic, a, b = hertz_force(at.depth, at.along, 0.5 / w.head_radius, w.pair.modulus)
     load = elastic * max(0.0, 1.0 + w.contact_damping * approach)
     forwards, by = float(np.clip(0.5 + 0.5 * speed / SLOWEST_SPEED, 0.0, 1.0)), max(abs(speed), SLOWEST_SPEED)
     mirror, creep = np.array([-1.0, 1.0, -1.0]), np.zeros(3)
     if forwards > 0.0:
-        creep += forwards * creeping(w, (load, a, b), slip / by, law, cells)
+        creep += forwards * creep_forces(w, (load, a, b), slip / by, law, cells)
     if forwards < 1.0:
-        creep += (1.0 - forwards) * mirror * creeping(w, (load, a, b), mirror * slip / by, law, cells)
+        creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / by, law, cells)
     beyond = max(0.0, side * axle.centre[1] - w.flange_clearance)
     push = np.array([0.0, -side * w.flange_stiffness * beyond, 0.0])
     force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * at.normal + push
@@ -149,14 +149,14 @@ class PlainWheelset:
         curvatures = wheelset.slant[1] / (2.0 * wheelset.radius), 0.5 / wheelset.head_radius
 
         def short(depth: float) -> float:
-            return pressed(depth, *curvatures, wheelset.pair.modulus)[0] - half
+            return hertz_force(depth, *curvatures, wheelset.pair.modulus)[0] - half
 
         self.sunk = brentq(short, 1e-9, 1e-2, xtol=1e-17) / wheelset.slant[1]
 
     def patches(self, state: np.ndarray) -> list[PatchForces]:
         """Contact forces of both rails for a state (10,), right rail first."""
         axle = axle_of(state, self.speed)
-        return [patch(self.wheelset, side, axle, self.law, self.cells) for side in (1.0, -1.0)]
+        return [patch_forces(self.wheelset, side, axle, self.law, self.cells) for side in (1.0, -1.0)]
 
     def by_rails(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (N) and moment about the centre (N m) of both rails on the wheelset, in the track's axes."""

@@ -10,11 +10,11 @@ from models.core.errors import InputError
 
 Cases = tuple[np.ndarray, ...]
 """One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its path (n,), or one number (1,)."""
-HARDLY = 1e-3
+SMALLEST_CASE_SHARE = 1e-3
 """Of the largest case: changes of a smaller one are relative to this share."""
-ROUNDING, NOTHING = 1e-10, 1e-15
+ROUNDING_SHARE, ABSOLUTE_ROUNDING = 1e-10, 1e-15
 """Of the largest value in a unit, and in SI units: what moves less does not move at all, but for rounding."""
-SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
+SCALAR_OF_PATH = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
 """Words that make a number of a path, as in "rms f1"."""
 
 
@@ -32,7 +32,7 @@ class Quantity:
     @property
     def sizes(self) -> np.ndarray:
         """Sizes by which changes of the quantity are divided, one for each case."""
-        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else sizes(self.cases)
+        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else scale_of_cases(self.cases)
 
 
 @dataclass(frozen=True)
@@ -52,25 +52,25 @@ class RunQuantities:
             return self.quantities[name]
         word, _, rest = name.partition(" ")
         path = self.quantities.get(rest)
-        if word in SCALARS and path is not None and not path.sampled:
-            return Quantity(path.unit, tuple(np.array([SCALARS[word](case)]) for case in path.cases))
+        if word in SCALAR_OF_PATH and path is not None and not path.sampled:
+            return Quantity(path.unit, tuple(np.array([SCALAR_OF_PATH[word](case)]) for case in path.cases))
         allowed = (
             "no such quantity in this scene, whose own are, each also with 'rms' or 'max' before it if it is a path"
         )
         raise InputError(file, "quantities", name, allowed, tuple(self.quantities))
 
 
-def sizes(full_results: Sequence[np.ndarray]) -> np.ndarray:
+def scale_of_cases(full_results: Sequence[np.ndarray]) -> np.ndarray:
     """Sizes by which changes are divided, one for each case: the standard deviation of a path, the magnitude of a
     number.
 
-    A case that hardly moves compared with the others has at least the size HARDLY times the largest one.
+    A case that hardly moves compared with the others has at least the size SMALLEST_CASE_SHARE times the largest one.
     """
     amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full_results])
-    return np.maximum(amounts, HARDLY * amounts.max(initial=0.0))
+    return np.maximum(amounts, SMALLEST_CASE_SHARE * amounts.max(initial=0.0))
 
 
-def rounding(answer: RunQuantities, unit: str) -> float:
+def rounding_floor(answer: RunQuantities, unit: str) -> float:
     """Size below which changes of quantities with this unit are only rounding."""
     alike = [
         np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
@@ -78,10 +78,10 @@ def rounding(answer: RunQuantities, unit: str) -> float:
         if quantity.unit == unit
         for case in quantity.cases
     ]
-    return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
+    return max(ABSOLUTE_ROUNDING, ROUNDING_SHARE * float(max(alike, default=0.0)))
 
 
-SURE = 0.9985
+CONFIDENCE_PROBABILITY = 0.9985
 """Probability that chance adds no more to either side than is said of it."""
 
 
@@ -97,12 +97,17 @@ def by_chance(change: Cases, full_results: Cases) -> tuple[float, float]:
         if not ratio > 0.0:  # nothing is left, or no mean square at all
             return (1.0, 0.0) if not (moved + unmoved).any() else (np.inf, np.inf)
         rest, m = moved - (ratio - 1.0) * unmoved, len(unmoved)
-        error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * unmoved.mean()) / (2.0 * np.sqrt(ratio))
+        error = (
+            float(stdtrit(m - 1, CONFIDENCE_PROBABILITY))
+            * rest.std(ddof=1)
+            / (np.sqrt(m) * unmoved.mean())
+            / (2.0 * np.sqrt(ratio))
+        )
         worst = max(worst, (float(abs(np.sqrt(ratio) - 1.0)), float(error)), key=sum)
     return worst
 
 
-def less(run: Cases, full_results: Cases) -> Cases:
+def difference_of_runs(run: Cases, full_results: Cases) -> Cases:
     """Differences of two runs at the times that both have, which are those of the run with longer steps.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
@@ -116,21 +121,21 @@ def less(run: Cases, full_results: Cases) -> Cases:
                 "paths of runs that end by themselves cannot be compared: ask for "
                 "'rms' or 'max' of them, or for another number",
             )
-    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(run, full_results, strict=True))
+    return tuple(np.subtract(*_at_common_times(*pair)) for pair in zip(run, full_results, strict=True))
 
 
-def _thinned(*paths: np.ndarray) -> list[np.ndarray]:
+def _at_common_times(*paths: np.ndarray) -> list[np.ndarray]:
     """The paths at those times that all of them have."""
     few = min(map(len, paths))
     return [path[:: (len(path) - 1) // max(few - 1, 1) or 1] for path in paths]
 
 
-def added(*changes: Cases) -> Cases:
+def sum_of_differences(*changes: Cases) -> Cases:
     """Sum of several differences, at those times that all of them have."""
-    return tuple(np.sum(_thinned(*parts), axis=0) for parts in zip(*changes, strict=True))
+    return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
-def relative(change: Cases, size: np.ndarray) -> float:
+def largest_relative_change(change: Cases, size: np.ndarray) -> float:
     """Largest relative change among the cases: the rms difference of a path, or the difference of a number, divided by
     its size.
     """

@@ -23,31 +23,31 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import added
+from models.advice.choice.answer import sum_of_differences
 from models.advice.choice.screen import Screen
-from models.advice.choice.variants import Set, Variants
+from models.advice.choice.variants import EffectSet, Variants
 from models.core.assumptions import BrokenAssumption
 from models.core.errors import InputError
 
-BUDGET = 0.8
+PREDICTION_SHARE = 0.8
 """Share of the tolerance that predictions may use."""
-FINE = 0.05
+SCREENED_STEP_SHARE = 0.05
 """Share of the tolerance that the steps of screened runs may cost."""
-ROUGH = 0.15
+SAMPLED_STEP_SHARE = 0.15
 """The same where samples are compared that met the same roads: what a step costs is in both of them."""
-SHARPER = 8
+STEP_CHECK_REFINEMENT = 8
 """Steps so many times as short tell what the longest ones cost."""
-WINDOW = 0.25
+STEP_SEARCH_SHARE = 0.25
 """Share of a run by which these steps are chosen."""
-LEAST = 1e-3
+NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
-SHORTER = 2
+STEP_REDUCTION = 2
 """Times that steps become shorter where a confirmation fails, before effects are taken back."""
-ROUNDS = 30
+MOST_CONFIRMATIONS = 30
 """Sets that are confirmed at most."""
-TOGETHER = 16
+PAIRS_IN_ADVANCE = 16
 """Pairs whose runs are computed ahead at once, where there is somebody to compute them."""
-RUNS = 100
+RUN_BUDGET = 100
 """Runs of the scene, by their calls, that the search may take."""
 
 
@@ -56,30 +56,32 @@ class Choice:
     """Result of a choice of effects: those ``left_out`` of all ``candidates``, a step that is ``times`` as long, and
     relative changes (quantities,).
 
-    predicted : by the screen; remainder : estimate of what the prediction omits; confirmed : over the whole run;
-    chance : statistical error of this, where quantities are means of samples; within_tolerance : whether each sum of
-    both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the reduced scene.
-    rounds : runs of the whole scene for confirmation; spent : calls of all runs. more : factor, roughly, by which more
-    samples would let more effects be left out, 0 where statistical errors prevent nothing. ended : whether the search
-    ended before all sets were tried. barred : for effects that stay, the assumptions that the scene keeps and that
-    would be broken without them.
+    predicted_change : by the screen; prediction_remainder : estimate of what the prediction omits; confirmed_change :
+    over the whole run;
+    statistical_error : statistical error of this, where quantities are means of samples; within_tolerance : whether
+    each sum of both is. calls and seconds (CPU) : of the scene, of the scene with longer steps alone, and of the
+    reduced scene.
+    confirmations : runs of the whole scene for confirmation; calls_of_search : calls of all runs. sample_factor :
+    factor, roughly, by which more samples would let more effects be left out, 0 where statistical errors prevent
+    nothing. ended_early : whether the search ended before all sets were tried. assumptions_barring : for effects that
+    stay, the assumptions that the scene keeps and that would be broken without them.
     """
 
     candidates: tuple[str, ...]
     left_out: tuple[str, ...]
     times: int
-    predicted: np.ndarray
-    remainder: np.ndarray
-    confirmed: np.ndarray
-    chance: np.ndarray
+    predicted_change: np.ndarray
+    prediction_remainder: np.ndarray
+    confirmed_change: np.ndarray
+    statistical_error: np.ndarray
     within_tolerance: bool
     calls: tuple[int, ...]
     seconds: tuple[float, ...]
-    rounds: int
-    spent: int
-    more: float
-    ended: bool = False
-    barred: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
+    confirmations: int
+    calls_of_search: int
+    sample_factor: float
+    ended_early: bool = False
+    assumptions_barring: dict[str, list[BrokenAssumption]] = field(default_factory=dict)
 
 
 class Chooser:
@@ -103,45 +105,45 @@ class Chooser:
         self.tolerance, self.progress = tolerance, progress
         self.whole = Screen(Variants(scene, engine, executor), quantities)
         self.alike = self.whole.sampled == set(quantities)
-        part = self._part()
-        self.step_factor, self.error = self._steps(part)
-        self.teller = self._coarse(self.whole)
-        self.screen = self._coarse(part) if self.alike else self.teller
+        part = self._part_screen()
+        self.step_factor, self.error = self._longest_screen_step(part)
+        self.teller = self._coarse_screen(self.whole)
+        self.screen = self._coarse_screen(part) if self.alike else self.teller
         self.lengths = [self.step_factor * k for k in self.screen.variants.lengths()]
         self.effects = self.whole.variants.effects
-        self._reach: dict[Set, int] = {}
-        self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
-        self._pairs: list[Set] | None = None
+        self._reach: dict[EffectSet, int] = {}
+        self._confirmed: dict[EffectSet, tuple[int, np.ndarray, np.ndarray]] = {}
+        self._pairs: list[EffectSet] | None = None
         self.rounds, self._doubtful, self.ended = 0, list[float](), False
 
-    def _part(self) -> Screen:
+    def _part_screen(self) -> Screen:
         """Screen of the first part of the scene, or of a few of its samples."""
         whole = self.whole.variants
         if not whole.system.WINDOWED:
             return self.whole
-        part = whole.window(math.ceil(WINDOW * whole.system.steps(whole.scene)))
+        part = whole.window(math.ceil(STEP_SEARCH_SHARE * whole.system.steps(whole.scene)))
         return self.whole if part is whole else Screen(part, self.whole.quantities)
 
-    def _coarse(self, screen: Screen) -> Screen:
+    def _coarse_screen(self, screen: Screen) -> Screen:
         """Screen of the same runs in longer steps, by the factor ``step_factor``."""
         runs = screen.variants
         coarse = Variants(runs.changed(frozenset(), self.step_factor), runs.engine, runs.executor)
         return screen if self.step_factor == 1 else Screen(coarse, screen.quantities)
 
-    def _steps(self, screen: Screen) -> tuple[int, np.ndarray]:
+    def _longest_screen_step(self, screen: Screen) -> tuple[int, np.ndarray]:
         """Longest steps that are allowed for the screen, as a multiple of the scene's own, and the relative changes
         (quantities,) that they cause.
         """
         whole = self.whole.variants
         lengths = [k for k in whole.lengths() if k in screen.variants.lengths()]
-        allowed = (ROUGH if self.alike else FINE) * self.tolerance
-        longest, error = self._longest(screen, frozenset(), lengths, allowed)
+        allowed = (SAMPLED_STEP_SHARE if self.alike else SCREENED_STEP_SHARE) * self.tolerance
+        longest, error = self._longest_allowed(screen, frozenset(), lengths, allowed)
         while whole.of(times=longest) is None:  # its run fails after that part
             longest = max(k for k in lengths if k < longest)
         return longest, error
 
-    def _longest(
-        self, screen: Screen, omitted_effects: Set, lengths: list[int], allowed: float
+    def _longest_allowed(
+        self, screen: Screen, omitted_effects: EffectSet, lengths: list[int], allowed: float
     ) -> tuple[int, np.ndarray]:
         """Longest step of ``lengths`` whose relative changes (quantities,) are allowed, and these changes. It is found
         by bisection; the first step is always allowed.
@@ -153,94 +155,98 @@ class Chooser:
             low, high, shares = (middle, high, tried) if (tried <= allowed).all() else (low, middle, shares)
         return lengths[low], shares
 
-    def share(self, omitted_effects: Set) -> float:
+    def share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change, with a bound on what the prediction omits, to the tolerance; infinite
         where leaving the effects out breaks an assumption that the scene keeps.
         """
-        if self.barred(omitted_effects):
+        if self.breaks_assumption(omitted_effects):
             return math.inf
-        error = self.error + self.screen.predicted(omitted_effects) + self.screen.remainder(omitted_effects)
+        error = (
+            self.error
+            + self.screen.predicted_change(omitted_effects)
+            + self.screen.higher_order_estimate(omitted_effects)
+        )
         return float(np.max(error)) / self.tolerance
 
-    def barred(self, omitted_effects: Set) -> bool:
+    def breaks_assumption(self, omitted_effects: EffectSet) -> bool:
         """Whether leaving out these effects breaks an assumption that the scene keeps. For more than two effects this
         is predicted from pairs: it does if, for some effect, every pair with another one does.
         """
         runs = self.screen.variants
         if len(omitted_effects) <= 2:
-            return bool(runs.breaks(omitted_effects))
+            return bool(runs.newly_broken(omitted_effects))
         return any(
-            all(runs.breaks(frozenset([effect, other])) for other in omitted_effects - {effect})
+            all(runs.newly_broken(frozenset([effect, other])) for other in omitted_effects - {effect})
             for effect in omitted_effects
         )
 
-    def reach(self, omitted_effects: Set) -> int:
+    def reach(self, omitted_effects: EffectSet) -> int:
         """Longest step without these effects that the predictions allow, as a multiple of the scene's own."""
         if omitted_effects not in self._reach:
-            left = max(0.0, BUDGET - self.share(omitted_effects)) * self.tolerance
-            self._reach[omitted_effects], _ = self._longest(self.screen, omitted_effects, self.lengths, left)
+            left = max(0.0, PREDICTION_SHARE - self.share(omitted_effects)) * self.tolerance
+            self._reach[omitted_effects], _ = self._longest_allowed(self.screen, omitted_effects, self.lengths, left)
         return self._reach[omitted_effects]
 
-    def work(self, omitted_effects: Set) -> float:
+    def work(self, omitted_effects: EffectSet) -> float:
         """Work of a run without these effects in the longest step that is allowed; infinite if the run fails."""
         return self.screen.variants.work(omitted_effects, self.reach(omitted_effects) // self.step_factor)
 
-    def confirm(self, omitted_effects: Set) -> np.ndarray:
+    def confirm(self, omitted_effects: EffectSet) -> np.ndarray:
         """Relative changes (quantities,) over the whole run without these effects, plus their statistical errors, in
         the longest step that is confirmed, or nearly so.
         """
         if omitted_effects not in self._confirmed:
             longest = self.reach(omitted_effects)
-            for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
+            for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + STEP_REDUCTION]:
                 self.rounds += 1
                 change = self.whole.between(self.whole.variants.of(omitted_effects, times), self.whole.variants.of())
-                shares, chance = self.whole.shares(change), self.whole.chance(change)
-                if self.whole.variants.breaks(omitted_effects, times):
+                shares, chance = self.whole.relative_changes(change), self.whole.statistical_errors(change)
+                if self.whole.variants.newly_broken(omitted_effects, times):
                     shares = np.full_like(shares, np.inf)
                 self._confirmed[omitted_effects] = times, shares, chance
-                if self.holds(shares + chance):
+                if self.within_tolerance(shares + chance):
                     break
                 if (shares < self.tolerance).all():
                     self._doubtful.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
         return np.add(*self._confirmed[omitted_effects][1:])
 
-    def holds(self, changes: np.ndarray) -> bool:
+    def within_tolerance(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
         return bool((changes <= self.tolerance).all())
 
-    def better(self, further: Set, current: Set) -> bool:
-        """Whether leaving out ``further`` is confirmed, and takes less work than leaving out ``current``, each in its
-        confirmed step.
+    def is_better(self, further: EffectSet, current: EffectSet) -> bool:
+        """Whether leaving out ``change_if_left_out_too`` is confirmed, and takes less work than leaving out
+        ``current``, each in its confirmed step.
         """
-        if not self.holds(self.confirm(further)):
+        if not self.within_tolerance(self.confirm(further)):
             return False
         work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, current)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
         """The greedy choice, confirmed over the whole run."""
-        none: Set = frozenset()
-        if not self.holds(self.confirm(none)):
+        none: EffectSet = frozenset()
+        if not self.within_tolerance(self.confirm(none)):
             self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
-        kept, banned = [none], set[Set]()
-        while self.rounds < ROUNDS and not self.ended:
+        kept, banned = [none], set[EffectSet]()
+        while self.rounds < MOST_CONFIRMATIONS and not self.ended:
             path = self.path(kept, banned)
             if path == kept:
                 break
-            if self.better(path[-1], kept[-1]):
+            if self.is_better(path[-1], kept[-1]):
                 kept = path
                 continue
             low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
             while high - low > 1:
                 middle = (low + high) // 2
-                low, high = (middle, high) if self.better(path[middle], kept[-1]) else (low, middle)
+                low, high = (middle, high) if self.is_better(path[middle], kept[-1]) else (low, middle)
             banned.add(path[high] - path[low])
             kept = path[: low + 1]
-        return self._sure(self._choice(kept[-1]))
+        return self._choice_with_fresh_samples(self._choice(kept[-1]))
 
-    def _sure(self, choice: Choice) -> Choice:
+    def _choice_with_fresh_samples(self, choice: Choice) -> Choice:
         """The choice; InputError if nothing can be left out only because the statistical errors are too large."""
-        if not choice.more or choice.left_out or choice.times > 1:
+        if not choice.sample_factor or choice.left_out or choice.times > 1:
             return choice
         raise InputError(
             self.whole.variants.scene.file,
@@ -248,12 +254,12 @@ class Chooser:
             self.tolerance,
             "is too fine for so few samples: "
             "what could go changes the quantities by less, but by chance it may be more; about "
-            f"{choice.more:.2g} times as many samples would tell",
+            f"{choice.sample_factor:.2g} times as many samples would tell",
         )
 
-    def _choice(self, omitted_effects: Set) -> Choice:
+    def _choice(self, omitted_effects: EffectSet) -> Choice:
         times, shares, chance = self._confirmed[omitted_effects]
-        none: Set = frozenset()
+        none: EffectSet = frozenset()
         shown = [(none, 1), (none, self._confirmed[none][0]), (omitted_effects, times)]
         calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
         each = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
@@ -262,48 +268,52 @@ class Chooser:
             tuple(sorted(omitted_effects)),
             times,
             self.told(omitted_effects, times),
-            self.teller.remainder(omitted_effects),
+            self.teller.higher_order_estimate(omitted_effects),
             shares,
             chance,
-            self.holds(shares + chance),
+            self.within_tolerance(shares + chance),
             tuple(calls),
             tuple(count * seconds for count, seconds in zip(calls, each, strict=True)),
             self.rounds,
-            self._spent(),
+            self._calls_so_far(),
             min(self._doubtful, default=0.0),
             self.ended,
-            {name: broken for name in self.effects if (broken := self.teller.variants.breaks(frozenset([name])))},
+            {name: broken for name in self.effects if (broken := self.teller.variants.newly_broken(frozenset([name])))},
         )
 
-    def _spent(self) -> int:
+    def _calls_so_far(self) -> int:
         """Number of right-hand side calls of all runs so far."""
         return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
     def _budget_spent(self) -> bool:
-        """Whether the search has used all the calls that it may make; if so, it sets ``ended``."""
+        """Whether the search has used all the calls that it may make; if so, it sets ``ended_early``."""
         whole_run = self.whole.variants.of()
-        share = self._spent() / (RUNS * whole_run.counts["calls"]) if whole_run else 1.0
+        share = self._calls_so_far() / (RUN_BUDGET * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
         self.progress(min(share, 1.0))
         return self.ended
 
-    def told(self, omitted_effects: Set, times: int) -> np.ndarray:
+    def told(self, omitted_effects: EffectSet, times: int) -> np.ndarray:
         """Predicted changes (quantities,) if effects are left out and the step is lengthened as well. What the step
         changes comes from a comparison with a shorter step.
         """
         screen, runs = self.teller, self.whole.variants
-        change = screen.change(omitted_effects) if omitted_effects else None
+        change = screen.predicted_difference(omitted_effects) if omitted_effects else None
         if times == 1:
-            return screen.predicted(omitted_effects)
-        shorter = [k for k in reversed(runs.lengths()) if times % k == 0 and (SHARPER * k <= times or k == 1)]
+            return screen.predicted_change(omitted_effects)
+        shorter = [
+            k for k in reversed(runs.lengths()) if times % k == 0 and (STEP_CHECK_REFINEMENT * k <= times or k == 1)
+        ]
         step = screen.between(
             runs.of(omitted_effects, times), next(filter(None, (runs.of(omitted_effects, k) for k in shorter)), None)
         )
         if change is None or step is None or times % self.step_factor:
-            return screen.predicted(omitted_effects) + screen.shares(step)
-        return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
+            return screen.predicted_change(omitted_effects) + screen.relative_changes(step)
+        return screen.relative_changes(
+            {name: sum_of_differences(change[name], step[name]) for name in screen.quantities}
+        )
 
-    def further(self, omitted_effects: Set) -> dict[str, float]:
+    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[str, float]:
         """Predicted change for each effect that stayed, if it were left out, too: with a larger tolerance than this, it
         could be.
 
@@ -316,37 +326,41 @@ class Chooser:
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
+    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
         """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow."""
         path = list(start)
         while True:
-            step = self._next(path[-1], banned, [frozenset([effect]) for effect in self.effects])
-            step = step or self._next(path[-1], banned, self._promising())
+            step = self._best_step(path[-1], banned, [frozenset([effect]) for effect in self.effects])
+            step = step or self._best_step(path[-1], banned, self._promising_pairs())
             if not step:
                 return path
             path.append(path[-1] | step)
 
-    def _promising(self) -> list[Set]:
+    def _promising_pairs(self) -> list[EffectSet]:
         """Pairs of effects of which at least one exceeds the budget alone, while both together keep to it."""
         if self._pairs is None:
             alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
-            pairs = [pair for pair in combinations(self.effects, 2) if max(alone[effect] for effect in pair) > BUDGET]
+            pairs = [
+                pair
+                for pair in combinations(self.effects, 2)
+                if max(alone[effect] for effect in pair) > PREDICTION_SHARE
+            ]
             pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
-            self._pairs = self._within([frozenset(pair) for pair in pairs])
+            self._pairs = self._pairs_within_budget([frozenset(pair) for pair in pairs])
         return self._pairs
 
-    def _within(self, pairs: list[Set]) -> list[Set]:
+    def _pairs_within_budget(self, pairs: list[EffectSet]) -> list[EffectSet]:
         """Pairs of effects that keep to the error budget, as far as the budget of calls lets them be tested."""
-        within = list[Set]()
+        within = list[EffectSet]()
         for i, pair in enumerate(pairs):
             if self._budget_spent():
                 break
-            if i % TOGETHER == 0:
-                self.screen.ahead(pairs[i : i + TOGETHER])
-            within += [pair] if self.share(pair) <= BUDGET else []
+            if i % PAIRS_IN_ADVANCE == 0:
+                self.screen.ahead(pairs[i : i + PAIRS_IN_ADVANCE])
+            within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 
-    def _next(self, omitted_effects: Set, banned: set[Set], steps: list[Set]) -> Set:
+    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], steps: list[EffectSet]) -> EffectSet:
         """The step that saves the most work for what it adds to the predicted error; empty where no step keeps to the
         budget.
         """
@@ -364,8 +378,8 @@ class Chooser:
             if self._budget_spent():
                 break
             share = self.share(further)
-            saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
-            score = saved / max(share - now, LEAST) if saved > 0.0 else 0.0
+            saved = math.log(work / self.work(further)) if share <= PREDICTION_SHARE else 0.0
+            score = saved / max(share - now, NEGLIGIBLE_SHARE) if saved > 0.0 else 0.0
             if score > most:
                 best, most = step - omitted_effects, score
         return best

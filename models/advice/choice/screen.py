@@ -14,11 +14,19 @@ from typing import NoReturn
 
 import numpy as np
 
-from models.advice.choice.answer import Cases, RunQuantities, added, by_chance, less, relative, rounding
-from models.advice.choice.variants import Set, Variants
+from models.advice.choice.answer import (
+    Cases,
+    RunQuantities,
+    by_chance,
+    difference_of_runs,
+    largest_relative_change,
+    rounding_floor,
+    sum_of_differences,
+)
+from models.advice.choice.variants import EffectSet, Variants
 from models.core.errors import InputError
 
-FEW = 1 / 3
+LARGEST_SAMPLE_SHARE = 1 / 3
 """Share of a sampled quantity's mean square that one sample may have."""
 Changes = dict[str, Cases]
 """Differences of two runs, quantity by quantity."""
@@ -39,11 +47,11 @@ class Screen:
         self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
         self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
         for name, size in self.sizes.items():
-            if not (np.isfinite(size).all() and (size > rounding(full, quantities_by_name[name].unit)).any()):
+            if not (np.isfinite(size).all() and (size > rounding_floor(full, quantities_by_name[name].unit)).any()):
                 self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
         for name in self.sampled:
             share = max(float(case.max() / case.sum()) for case in self.full[name])
-            if share > FEW:  # no error could be told of it
+            if share > LARGEST_SAMPLE_SHARE:  # no error could be told of it
                 m = len(self.full[name][0])
                 why = f"by one sample of {m}, so that chance decides: ask for more or longer ones"
                 self._refuse(name, f"is made up to {100 * share:.0f} % {why}")
@@ -56,91 +64,105 @@ class Screen:
         if run is None or other_answer is None:
             return None
         try:
-            return {name: less(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities}
+            return {
+                name: difference_of_runs(run.of(name).cases, other_answer.of(name).cases) for name in self.quantities
+            }
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
             raise
 
-    def shares(self, change: Changes | None) -> np.ndarray:
-        """Relative changes (quantities,); infinite where ``change`` is None."""
-        return self._judged(change)[0]
+    def relative_changes(self, change: Changes | None) -> np.ndarray:
+        """Relative changes (quantities,); infinite where ``predicted_difference`` is None."""
+        return self._changes_with_errors(change)[0]
 
-    def chance(self, change: Changes | None) -> np.ndarray:
+    def statistical_errors(self, change: Changes | None) -> np.ndarray:
         """Statistical errors (quantities,) of predicted changes; zero for a quantity that is no mean of samples."""
-        return self._judged(change)[1]
+        return self._changes_with_errors(change)[1]
 
-    def _judged(self, change: Changes | None) -> np.ndarray:
+    def _changes_with_errors(self, change: Changes | None) -> np.ndarray:
         """Relative changes and their statistical errors (2, quantities)."""
         if change is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
             by_chance(change[name], self.full[name])
             if name in self.sampled
-            else (relative(change[name], self.sizes[name]), 0.0)
+            else (largest_relative_change(change[name], self.sizes[name]), 0.0)
             for name in self.quantities
         ]
         return np.array(pairs).T
 
-    def alone(self, effect: str) -> Changes | None:
+    def first_order_change(self, effect: str) -> Changes | None:
         """First-order difference d: the change if this effect alone is left out."""
-        return self.change(frozenset([effect]))
+        return self.predicted_difference(frozenset([effect]))
 
     def second(self, first: str, second_effect: str) -> Changes | None:
         """Second-order difference e of a pair: the change without both, less the changes without each alone."""
         sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
-        both, *singles = (self.change(effects) for effects in sets)
+        both, *singles = (self.predicted_difference(effects) for effects in sets)
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:
             return None
-        return {name: added(both[name], *(_minus(part[name]) for part in known)) for name in self.quantities}
+        return {
+            name: sum_of_differences(both[name], *(_negated(part[name]) for part in known)) for name in self.quantities
+        }
 
-    def ahead(self, sets: Iterable[Set]) -> None:
-        """Compute in advance the runs that ``change`` needs for these sets."""
-        self.variants.ahead((part, 1) for chosen in sets for part in _parts(chosen))
+    def ahead(self, sets: Iterable[EffectSet]) -> None:
+        """Compute in advance the runs that ``predicted_difference`` needs for these sets."""
+        self.variants.ahead((part, 1) for chosen in sets for part in _sets_needed(chosen))
 
-    def change(self, omitted_effects: Set) -> Changes | None:
+    def predicted_difference(self, omitted_effects: EffectSet) -> Changes | None:
         """Predicted differences if a set of effects is left out; None where they cannot be predicted."""
         parts: list[Changes | None] = [None]
         if len(omitted_effects) > 2:
             parts = [
-                *map(self.alone, omitted_effects),
+                *map(self.first_order_change, omitted_effects),
                 *(self.second(*pair) for pair in combinations(sorted(omitted_effects), 2)),
             ]
         if None in parts:
             return self.between(self.variants.of(omitted_effects), self.variants.of())
-        return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
+        return {name: sum_of_differences(*(part[name] for part in parts if part)) for name in self.quantities}
 
-    def predicted(self, omitted_effects: Set) -> np.ndarray:
-        """Predicted relative changes (quantities,) if a set of effects is left out, without the ``remainder``."""
-        return self.shares(self.change(omitted_effects)) if omitted_effects else np.zeros(len(self.quantities))
+    def predicted_change(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Predicted relative changes (quantities,) if a set of effects is left out, without the
+        ``higher_order_estimate``.
+        """
+        return (
+            self.relative_changes(self.predicted_difference(omitted_effects))
+            if omitted_effects
+            else np.zeros(len(self.quantities))
+        )
 
-    def remainder(self, omitted_effects: Set) -> np.ndarray:
+    def higher_order_estimate(self, omitted_effects: EffectSet) -> np.ndarray:
         """Estimate (quantities,) of changes of third and higher order: the second order, reduced by the ratio of the
         second order to the first.
         """
         none = np.zeros(len(self.quantities))
         if len(omitted_effects) <= 2:
             return none
-        first = np.sum([self.shares(self.alone(effect)) for effect in omitted_effects], axis=0)
-        second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0)
+        first = np.sum([self.relative_changes(self.first_order_change(effect)) for effect in omitted_effects], axis=0)
+        second = np.sum(
+            [self.relative_changes(self.second(*pair)) for pair in combinations(sorted(omitted_effects), 2)], axis=0
+        )
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
             return none  # the set was run itself
         return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
 
-    def of_step(self, omitted_effects: Set, times: int) -> np.ndarray:
+    def of_step(self, omitted_effects: EffectSet, times: int) -> np.ndarray:
         """Relative changes (quantities,) that longer steps alone cause in a run without these effects."""
         if times == 1:
             return np.zeros(len(self.quantities))
-        return self.shares(self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects)))
+        return self.relative_changes(
+            self.between(self.variants.of(omitted_effects, times), self.variants.of(omitted_effects))
+        )
 
 
-def _parts(omitted_effects: Set) -> list[Set]:
+def _sets_needed(omitted_effects: EffectSet) -> list[EffectSet]:
     """Sets of effects whose runs are needed to predict the changes for a set."""
     if len(omitted_effects) <= 2:
         return [omitted_effects]
     return [frozenset(few) for count in (1, 2) for few in combinations(sorted(omitted_effects), count)]
 
 
-def _minus(cases: Cases) -> Cases:
+def _negated(cases: Cases) -> Cases:
     return tuple(-case for case in cases)

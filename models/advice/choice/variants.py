@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from models.advice.choice.answer import RunQuantities
-from models.core.assumptions import BrokenAssumption, breaches, watching
+from models.core.assumptions import BrokenAssumption, collected_breaches, watching
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.core.scene_effects import (
@@ -19,23 +19,23 @@ from models.core.scene_effects import (
     module_of,
     named_effects,
     own_table,
-    rebuilt,
+    rebuilt_scene,
+    scene_without,
     with_effects,
-    without,
 )
 from models.core.systems import modules_of
 from models.ensemble.runner import block_results
 
-Set = frozenset[str]
-Key = tuple[Set, int]
+EffectSet = frozenset[str]
+VariantKey = tuple[EffectSet, int]
 """A variant: the effects that are left out, and how many times as long its steps are."""
-Outcome = tuple[RunQuantities | None, dict[str, BrokenAssumption]]
+VariantOutcome = tuple[RunQuantities | None, dict[str, BrokenAssumption]]
 """A variant's run, and the assumptions that it breaks."""
-LONGEST = 128
+LARGEST_STEP_FACTOR = 128
 """No step is tried that is more times as long as the scene's."""
-FINE = 60
+SHORTEST_PART_STEPS = 60
 """Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
-REPEATS, ENOUGH = 3, 0.02
+TIMED_RUNS, LEAST_TIMED_SECONDS = 3, 0.02
 """Runs of which the shortest tells the seconds; two where they took so many (s), as the first may have to load."""
 
 
@@ -69,77 +69,81 @@ class Variants:
     executor: Executor | None = None
     system: ModuleType = field(init=False)
     calls: int = 0
-    _kept: dict[Key, RunQuantities | None] = field(default_factory=dict)
-    _costs: dict[Set, float] = field(default_factory=dict)
-    _broken: dict[Key, dict[str, BrokenAssumption]] = field(default_factory=dict)
-    _ready: dict[Key, Outcome] = field(default_factory=dict)
+    _kept: dict[VariantKey, RunQuantities | None] = field(default_factory=dict)
+    _work_of_set: dict[EffectSet, float] = field(default_factory=dict)
+    _assumptions_broken: dict[VariantKey, dict[str, BrokenAssumption]] = field(default_factory=dict)
+    _computed_in_advance: dict[VariantKey, VariantOutcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.system = system_of(self.scene)
-        self.scene = self.system.opened(self.scene) if self._opened else self.scene
-        self._job = partial(_run, self.scene, self.engine)
+        self.scene = self.system.opened(self.scene) if self._knows_effects else self.scene
+        self._job = partial(_run_variant_in_worker, self.scene, self.engine)
 
     @property
-    def _opened(self) -> bool:
+    def _knows_effects(self) -> bool:
         """Whether the system replaces the scene by an object that knows its effects and makes its own variants."""
         return hasattr(self.system, "opened")
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that the scene has."""
-        return tuple(self.scene.named) if self._opened else named_effects(self.scene)
+        return tuple(self.scene.named) if self._knows_effects else named_effects(self.scene)
 
     @property
     def absent(self) -> tuple[str, ...]:
         """Names of the effects that the scene does not have."""
-        return tuple(self.scene.absent) if self._opened else absent_effects(self.scene)
+        return tuple(self.scene.absent) if self._knows_effects else absent_effects(self.scene)
 
     def beside(self, name: str) -> Any:
         """The scene with one of the absent effects added, at its usual values; InputError where it cannot be added."""
-        return self.scene.beside(name) if self._opened else with_effects(self.scene, name)
+        return self.scene.beside(name) if self._knows_effects else with_effects(self.scene, name)
 
-    def says(self, name: str) -> str:
+    def sentence_on_effect(self, name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
-        told = self.scene.said if self._opened else {}
+        told = self.scene.said if self._knows_effects else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
     def of(self, omitted_effects: Iterable[str] = (), times: int = 1) -> RunQuantities | None:
         """Quantities of the run without these effects, in steps ``times`` as long; None if it fails."""
         key = (frozenset(omitted_effects), times)
         if key not in self._kept:
-            answer, self._broken[key] = self._ready.pop(key) if key in self._ready else self.run(key)
+            answer, self._assumptions_broken[key] = (
+                self._computed_in_advance.pop(key) if key in self._computed_in_advance else self.run(key)
+            )
             self._kept[key] = answer
             self.calls += answer.counts["calls"] if answer else 0
         return self._kept[key]
 
-    def ahead(self, keys: Iterable[Key]) -> None:
+    def ahead(self, keys: Iterable[VariantKey]) -> None:
         """Let the executor compute runs that will probably be requested; without an executor nothing is computed in
         advance.
         """
         if self.executor is not None:
-            new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._ready]
-            self._ready |= zip(new, block_results(self._job, new, self.executor), strict=True)
+            new = [key for key in dict.fromkeys(keys) if key not in self._kept and key not in self._computed_in_advance]
+            self._computed_in_advance |= zip(new, block_results(self._job, new, self.executor), strict=True)
 
-    def run(self, key: Key) -> Outcome:
+    def run(self, key: VariantKey) -> VariantOutcome:
         """Run a variant, even if it was run before."""
-        with breaches() as broken:
+        with collected_breaches() as broken:
             return self._run(*key), broken
 
-    def _run(self, omitted_effects: Set, times: int) -> RunQuantities | None:
+    def _run(self, omitted_effects: EffectSet, times: int) -> RunQuantities | None:
         try:
             answer: RunQuantities = self.system.computed_quantities(self.changed(omitted_effects, times), self.engine)
         except (InputError, RunFailed):
             return None
         return answer
 
-    def breaks(self, omitted_effects: Set, times: int = 1) -> list[BrokenAssumption]:
+    def newly_broken(self, omitted_effects: EffectSet, times: int = 1) -> list[BrokenAssumption]:
         """Assumptions that the scene itself keeps, and that the run without these effects breaks."""
         if self.of(omitted_effects, times) is None or self.of() is None:
             return []
-        known = self._broken[frozenset(), 1]
-        return [broken for name, broken in self._broken[omitted_effects, times].items() if name not in known]
+        known = self._assumptions_broken[frozenset(), 1]
+        return [
+            broken for name, broken in self._assumptions_broken[omitted_effects, times].items() if name not in known
+        ]
 
-    def stated(self, omitted_effects: Set, times: int = 1) -> list[Result]:
+    def stated(self, omitted_effects: EffectSet, times: int = 1) -> list[Result]:
         """Results of a variant together with the errors that they state; its runs are repeated, with error
         estimates.
         """
@@ -148,18 +152,18 @@ class Variants:
             self.system.computed_quantities(self.changed(omitted_effects, times), self.engine, error=True)
         return results
 
-    def changed(self, omitted_effects: Set, times: int = 1) -> Any:
+    def changed(self, omitted_effects: EffectSet, times: int = 1) -> Any:
         """The scene of a variant; InputError where there can be no such scene."""
-        if self._opened:
-            return self.scene.without(omitted_effects).longer(times)
-        scene = without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
+        if self._knows_effects:
+            return self.scene.without(omitted_effects).in_longer_steps(times)
+        scene = scene_without(self.scene, *sorted(omitted_effects)) if omitted_effects else self.scene
         if times == 1:
             return scene
         table = own_table(scene)
         self.system.coarsen(table, scene, times)
-        return rebuilt(table, scene)
+        return rebuilt_scene(table, scene)
 
-    def work(self, omitted_effects: Set, times: int = 1) -> float:
+    def work(self, omitted_effects: EffectSet, times: int = 1) -> float:
         """Work of a run, from counts alone, so that it repeats exactly: calls times the sum of states, terms and
         remaining effects; infinite where the run fails.
         """
@@ -169,24 +173,24 @@ class Variants:
         each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - omitted_effects)
         return float(run.counts["calls"] * max(each, 1))
 
-    def per_call(self, omitted_effects: Set) -> float:
+    def per_call(self, omitted_effects: EffectSet) -> float:
         """CPU seconds of one call, the least of a few runs in this process; infinite where no run succeeds."""
-        if omitted_effects not in self._costs:
+        if omitted_effects not in self._work_of_set:
             took, run = (
                 list[float](),
                 self.of(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
             )
-            while run is not None and (len(took) < 2 or (len(took) < REPEATS and sum(took) < ENOUGH)):
+            while run is not None and (len(took) < 2 or (len(took) < TIMED_RUNS and sum(took) < LEAST_TIMED_SECONDS)):
                 took.append(run.seconds)
-                self._costs[omitted_effects] = min(took) / run.counts["calls"]
+                self._work_of_set[omitted_effects] = min(took) / run.counts["calls"]
                 run = self._run(omitted_effects, 1)
-            self._costs.setdefault(omitted_effects, math.inf)
-        return self._costs[omitted_effects]
+            self._work_of_set.setdefault(omitted_effects, math.inf)
+        return self._work_of_set[omitted_effects]
 
     def lengths(self) -> list[int]:
         """Factors by which the step may be lengthened, so that whole numbers of steps fit into the run."""
         count = self.system.parts(self.scene)
-        return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
+        return [times for times in range(1, min(count, LARGEST_STEP_FACTOR) + 1) if count % times == 0]
 
     def window(self, steps: int) -> "Variants":
         """Variants of the first part of the run, of at least ``steps`` steps; of the whole run where this is hardly
@@ -194,17 +198,17 @@ class Variants:
 
         The length is one that the scene may have, for example whole samples of a measurement.
         """
-        if self._opened:
-            return Variants(self.scene.fewer(steps), self.engine, self.executor)
+        if self._knows_effects:
+            return Variants(self.scene.with_fewer_copies(steps), self.engine, self.executor)
         count = self.system.steps(self.scene)
-        for few in (n for n in range(steps, count) if n % FINE == 0 or count % n == 0):
+        for few in (n for n in range(steps, count) if n % SHORTEST_PART_STEPS == 0 or count % n == 0):
             table = own_table(self.scene)
             self.system.shorten(table, self.scene, few)
             with suppress(InputError):
-                return Variants(rebuilt(table, self.scene), self.engine, self.executor)
+                return Variants(rebuilt_scene(table, self.scene), self.engine, self.executor)
         return self
 
 
-def _run(scene: Any, engine: str, key: Key) -> Outcome:
+def _run_variant_in_worker(scene: Any, engine: str, key: VariantKey) -> VariantOutcome:
     """Do ``Variants.run`` in a worker process."""
     return Variants(scene, engine).run(key)

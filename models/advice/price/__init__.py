@@ -17,9 +17,9 @@ class SettingLadder:
 
     values : steps in s, relative tolerances where ``adaptive``, or a cell's share of the contact where ``cells``;
     order : declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is
-    not its default; sure : a reference is known where a finer rung changes it by less than the tolerance divided by
-    this; said : text on what that rung is, before the change, where it is not half the step, or cells and steps
-    together
+    not its default; confirmation_divisor : a reference is known where a finer rung changes it by less than the
+    tolerance divided by this; said : text on what that rung is, before the change, where it is not half the step, or
+    cells and steps together
     """
 
     engine: str
@@ -29,7 +29,7 @@ class SettingLadder:
     adaptive: bool = False
     default: float = 0.0
     cells: bool = False
-    sure: float = 20.0
+    confirmation_divisor: float = 20.0
     said: str = ""
 
     def setting(self, i: int) -> Setting:

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-HOLLOW = 10.0
+UNCERTAINTY_FACTOR = 10.0
 """A point is hollow if its error is below this many times the uncertainty of the reference."""
 FITTED_POINTS = 3
 """How many of the finest points an observed order is fitted to: the coarse end is not asymptotic yet."""
@@ -27,7 +27,7 @@ def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
-def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
+def coinciding_curves(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
     """Groups of curves (name -> {setting: error}) that coincide: their errors at all common settings agree to
     EQUAL_ERROR_SHARE.
 
@@ -35,12 +35,12 @@ def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, .
     """
     groups: list[list[str]] = []
     for name, curve in curves.items():
-        home = next((group for group in groups if _same(curve, curves[group[0]])), None)
+        home = next((group for group in groups if _coincide(curve, curves[group[0]])), None)
         groups.append([name]) if home is None else home.append(name)
     return [tuple(group) for group in groups if len(group) > 1]
 
 
-def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
+def _coincide(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
     common = set(a) & set(b)
     return len(common) >= 3 and all(abs(a[x] - b[x]) <= EQUAL_ERROR_SHARE * max(a[x], b[x]) for x in common)
 

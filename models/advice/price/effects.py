@@ -12,14 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.choice.answer import RunQuantities, by_chance, less, relative, rounding
+from models.advice.choice.answer import (
+    RunQuantities,
+    by_chance,
+    difference_of_runs,
+    largest_relative_change,
+    rounding_floor,
+)
 from models.advice.choice.variants import Variants, system_of
-from models.core.assumptions import breaches
+from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
 from models.systems.ride.of_scene import goes_in_time
 
-STEPS = 960
+MOST_PRICED_STEPS = 960
 """Of every run, so many are priced."""
 ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
 """Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
@@ -90,16 +96,16 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     system = system_of(scene)
     engine = engine or system.ENGINE
     all_of_it = Variants(scene, engine)
-    variants = all_of_it.window(STEPS)
+    variants = all_of_it.window(MOST_PRICED_STEPS)
     short, names = variants.scene, (*variants.effects, *variants.absent)
-    with breaches() as broken_alone:
+    with collected_breaches() as broken_alone:
         base: RunQuantities = system.computed_quantities(short, engine)
     runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
             other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
-            with breaches() as others:
+            with collected_breaches() as others:
                 first[name], runs[name] = (
                     system.computed_quantities(other, engine),
                     partial(system.computed_quantities, other, engine),
@@ -108,10 +114,10 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
             keeps[name] = tuple(assumption.says for key, assumption in without.items() if key not in beside)
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
-    micros = _turns(runs)
+    micros = _microseconds_by_turn(runs)
     prices = [
         replace(
-            _price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, "")),
+            _price_of_effect(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, "")),
             keeps=keeps.get(name, ()),
         )
         for name in names
@@ -122,12 +128,12 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
         system.steps(short),
         system.steps(all_of_it.scene),
         base.counts,
-        spread(micros[""]),
+        median_and_deviation(micros[""]),
         tuple(prices),
     )
 
 
-def _turns(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
+def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (turns,) for every run; the runs take turns in random order."""
     micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
@@ -140,13 +146,13 @@ def _turns(runs: dict[str, Callable[[], RunQuantities]]) -> dict[str, np.ndarray
     return {name: np.array(values) for name, values in micros.items()}
 
 
-def spread(values: np.ndarray) -> tuple[float, float]:
+def median_and_deviation(values: np.ndarray) -> tuple[float, float]:
     """Median and median absolute deviation of values."""
     told = describe(values.tolist())
     return told["median"], told["mad"]
 
 
-def _price(
+def _price_of_effect(
     variants: Variants,
     name: str,
     base: RunQuantities,
@@ -155,7 +161,7 @@ def _price(
     unchanged: np.ndarray,
     why: str,
 ) -> EffectPrice:
-    there, says = name in variants.effects, variants.says(name)
+    there, says = name in variants.effects, variants.sentence_on_effect(name)
     if other_answer is None or took is None:
         return EffectPrice(name, there, says, why)
     before, after = (other_answer, base) if there else (base, other_answer)
@@ -168,20 +174,20 @@ def _price(
         says,
         "",
         (before.counts, after.counts),
-        spread(slow - fast),
+        median_and_deviation(slow - fast),
         paired_ratio(*seconds),
-        _changes(base, other_answer),
+        _quantity_changes(base, other_answer),
         gone,
     )
 
 
-def _changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
+def _quantity_changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[QuantityChange, ...]:
     """Changes of the quantities that both runs have, relative to their size in the scene."""
     changed = []
     for name, quantity in base.quantities.items():
         if name in other_answer.quantities:
             try:
-                change = less(other_answer.quantities[name].cases, quantity.cases)
+                change = difference_of_runs(other_answer.quantities[name].cases, quantity.cases)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
             size = quantity.sizes
@@ -190,6 +196,8 @@ def _changes(base: RunQuantities, other_answer: RunQuantities) -> tuple[Quantity
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             most = max(float(np.sqrt(np.mean(difference**2))) for difference in change)
-            moved = most > rounding(base, quantity.unit)
-            changed.append(QuantityChange(name, quantity.unit, most, relative(change, size) if moved else 0.0))
+            moved = most > rounding_floor(base, quantity.unit)
+            changed.append(
+                QuantityChange(name, quantity.unit, most, largest_relative_change(change, size) if moved else 0.0)
+            )
     return tuple(sorted(changed, key=lambda difference: -difference.relative))

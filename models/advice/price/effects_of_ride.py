@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price.effects import ROUNDS, SEED, EffectPrice, PriceList, QuantityChange, spread
+from models.advice.price.effects import ROUNDS, SEED, EffectPrice, PriceList, QuantityChange, median_and_deviation
 from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import FullScene, Reduced
-from models.advice.ride_choice.screen import confirmed
+from models.advice.ride_choice.screen import exact_variances
 from models.core.errors import InputError
 from models.core.runge_kutta import step_on
-from models.core.scene_effects import absent_effects, listing, with_effects
+from models.core.scene_effects import absent_effects, effect_sentences, with_effects
 from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal, without
+from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_without, refusal_reason
 
-STEPS = 500
+TIMED_STEPS = 500
 """Steps that are timed in every turn."""
 
 
@@ -35,28 +35,28 @@ def price_list_of_ride(scene: Any) -> PriceList:
         rests = {effect.name: _without_effect(whole, effect) for effect in effects}
     more = {name: _with_one_more(scene, name, whole.speed) for name in absent_effects(scene)}
     systems = {name: rest for name, rest in ({"": whole.full} | rests | more).items() if isinstance(rest, Reduced)}
-    micros = _turns(systems)
-    says = listing(scene.system)
-    prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
-    prices += [_price(whole, name, says[name], more[name], micros, is_present=False) for name in more]
+    micros = _microseconds_by_turn(systems)
+    says = effect_sentences(scene.system)
+    prices = [_price_of_effect(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
+    prices += [_price_of_effect(whole, name, says[name], more[name], micros, is_present=False) for name in more]
     return PriceList(
         f"{scene.title} (at {whole.speed:g} m/s)",
         "closed form",
-        STEPS,
-        STEPS,
-        _counts(whole.full),
-        spread(micros[""]),
+        TIMED_STEPS,
+        TIMED_STEPS,
+        _counts_of_scene(whole.full),
+        median_and_deviation(micros[""]),
         tuple(prices),
     )
 
 
 def _without_effect(full_scene: FullScene, effect: Effect) -> Reduced | str:
     """The scene without an effect, or the reason why this is impossible."""
-    why = illegal([effect])
+    why = refusal_reason([effect])
     if why:
         return why
     try:
-        return full_scene.reduced(without(full_scene.scene, [effect]))
+        return full_scene.reduced(reduced_without(full_scene.scene, [effect]))
     except InputError as error:
         return error.allowed
 
@@ -69,7 +69,7 @@ def _with_one_more(scene: Any, name: str, speed: float) -> Reduced | str:
         return error.allowed
 
 
-def _counts(system: Reduced) -> dict[str, int]:
+def _counts_of_scene(system: Reduced) -> dict[str, int]:
     """Counts of a reduced scene: states, and calls of the right-hand side per second of motion in the longest stable
     step.
     """
@@ -77,7 +77,7 @@ def _counts(system: Reduced) -> dict[str, int]:
     return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 
-def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
+def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (ROUNDS,) for every system; the systems take turns in random order."""
     micros, order = {name: np.empty(ROUNDS) for name in systems}, np.random.default_rng(SEED)
     for i in range(ROUNDS):
@@ -91,12 +91,12 @@ def _step_microseconds(A: np.ndarray) -> float:
     """CPU microseconds of one step with the state matrix A."""
     x, step = np.ones(len(A)), 1e-6
     begun = time.process_time()
-    for _ in range(STEPS):
+    for _ in range(TIMED_STEPS):
         x = step_on(lambda _, state: A @ state, 0.0, x, step)
-    return 1e6 * (time.process_time() - begun) / STEPS
+    return 1e6 * (time.process_time() - begun) / TIMED_STEPS
 
 
-def _price(
+def _price_of_effect(
     full_scene: FullScene,
     name: str,
     description: str,
@@ -114,22 +114,24 @@ def _price(
         is_present,
         description,
         "",
-        (_counts(without_it[0]), _counts(with_it[0])),
-        spread(with_it[1] - without_it[1]),
+        (_counts_of_scene(without_it[0]), _counts_of_scene(with_it[0])),
+        median_and_deviation(with_it[1] - without_it[1]),
         paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
-        _changes(full_scene, other),
+        _deviation_changes(full_scene, other),
         gone,
     )
 
 
-def _changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
+def _deviation_changes(full_scene: FullScene, reduced: Reduced) -> tuple[QuantityChange, ...]:
     """Changes of the standard deviations, exact; infinite where white noise reaches a quantity."""
     names = full_scene.full.system.names
     units = [output.unit for output in full_scene.linear.outputs]
     units += ["m/s^2"] * (len(names) - len(units))  # weighted accelerations come last
     try:
         with np.errstate(invalid="ignore"):
-            full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (full_scene.full, reduced))
+            full, left = (
+                np.sqrt(exact_variances(system, list(range(len(names))))) for system in (full_scene.full, reduced)
+            )
     except InputError:
         return ()
     changes = [

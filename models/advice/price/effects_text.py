@@ -9,23 +9,23 @@ from models.advice.price.effects import EffectPrice, PriceList, QuantityChange
 
 SHOWN_QUANTITIES = 3
 """Quantities of an effect that are printed; JSON has all."""
-WIDTH = 26
+NAME_COLUMN_WIDTH = 26
 """Of the column of names."""
 ROUNDING_CHANGE = 1e-12
 """Relative change that is rounding."""
 
 
-def lines(prices: PriceList, quantities: list[str]) -> list[str]:
+def price_list_lines(prices: PriceList, quantities: list[str]) -> list[str]:
     """Text of a price list: the cost of the scene, then every effect with its cost and the changes that it makes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
         prices.title,
-        f"  {prices.engine}, {counts}{part}; {_micros(prices.micros)} a step, CPU, median and its deviation",
+        f"  {prices.engine}, {counts}{part}; {_microseconds_text(prices.micros)} a step, CPU, median and its deviation",
         "",
         "  effects of the scene: what each adds to it, and what leaving it out changes",
-        *(line for price in prices.prices if price.there for line in _price(price, quantities)),
-        *_absent(prices, quantities),
+        *(line for price in prices.prices if price.there for line in _effect_lines(price, quantities)),
+        *_absent_effect_lines(prices, quantities),
         "",
         "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
         + ("; +- what chance may add, of so few samples" if _by_chance(prices) else ""),
@@ -36,69 +36,69 @@ def _by_chance(prices: PriceList) -> bool:
     return any(change.chance for price in prices.prices for change in price.changes)
 
 
-def _absent(prices: PriceList, quantities: list[str]) -> list[str]:
-    rows = [line for price in prices.prices if not price.there for line in _price(price, quantities)]
+def _absent_effect_lines(prices: PriceList, quantities: list[str]) -> list[str]:
+    rows = [line for price in prices.prices if not price.there for line in _effect_lines(price, quantities)]
     return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
-def _micros(spread: tuple[float, float]) -> str:
-    return f"{_number(spread[0], 3)} +- {_number(spread[1], 1)} us"
+def _microseconds_text(spread: tuple[float, float]) -> str:
+    return f"{_number_text(spread[0], 3)} +- {_number_text(spread[1], 1)} us"
 
 
-def _number(value: float, digits: int) -> str:
+def _number_text(value: float, digits: int) -> str:
     """A number as text with ``digits`` significant digits, without an exponent even if it is large."""
     large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
 
-def _price(price: EffectPrice, quantities: list[str]) -> list[str]:
+def _effect_lines(price: EffectPrice, quantities: list[str]) -> list[str]:
     """Text on an effect: a line on its cost, and a line on the quantities that it changes."""
-    name = f"    {price.name:<{WIDTH}} "
+    name = f"    {price.name:<{NAME_COLUMN_WIDTH}} "
     if price.why:
         return [f"{name}no price: {price.why}"]
     ratio = f"{price.ratio[0]:.3g} times ({price.ratio[1]:.3g} to {price.ratio[2]:.3g})"
     plus = "+" if price.micros[0] >= 0.0 else ""
-    cost = f"{name}{plus}{_micros(price.micros)} a step, {ratio}{_counts(price)}"
+    cost = f"{name}{plus}{_microseconds_text(price.micros)} a step, {ratio}{_counts_text(price)}"
     further = ", ..." if len(price.gone) > SHOWN_QUANTITIES else ""
     new = f"; there with it alone: {', '.join(price.gone[:SHOWN_QUANTITIES])}{further}"
-    rows = [f"{_changes(price, quantities)}{new if price.gone else ''}"]
+    rows = [f"{_changes_text(price, quantities)}{new if price.gone else ''}"]
     rows += [f"keeps an assumption that is broken without it: {says}" for says in price.keeps]
-    return [cost, *(f"    {'':<{WIDTH}} {row}" for row in rows)]
+    return [cost, *(f"    {'':<{NAME_COLUMN_WIDTH}} {row}" for row in rows)]
 
 
-def _counts(price: EffectPrice) -> str:
+def _counts_text(price: EffectPrice) -> str:
     """Text of the counts that an effect changes."""
     before, after = price.counts
     told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
     return "; " + ", ".join(told) if told else ""
 
 
-def _changes(price: EffectPrice, quantities: list[str]) -> str:
+def _changes_text(price: EffectPrice, quantities: list[str]) -> str:
     """Text on the changes of the requested quantities, or of those that change most."""
     asked = [change for change in price.changes if change.name in quantities]
     shown = asked or [change for change in price.changes if change.relative > ROUNDING_CHANGE][:SHOWN_QUANTITIES]
-    return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
+    return "changes " + ("; ".join(map(_changed_quantity_text, shown)) or "nothing")
 
 
-def _changed(change: QuantityChange) -> str:
+def _changed_quantity_text(change: QuantityChange) -> str:
     unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
     name = change.name.partition(" [")[0]
-    beside = f" +- {_number(100 * change.chance, 2)} %" if change.chance else ""
-    share = f"{_number(100 * change.relative, 2)} %{beside}" if np.isfinite(change.relative) else "from nothing"
-    return f"{name} by {_number(change.absolute, 3)}{unit} ({share})"
+    beside = f" +- {_number_text(100 * change.chance, 2)} %" if change.chance else ""
+    share = f"{_number_text(100 * change.relative, 2)} %{beside}" if np.isfinite(change.relative) else "from nothing"
+    return f"{name} by {_number_text(change.absolute, 3)}{unit} ({share})"
 
 
 def as_dict(prices: PriceList) -> dict[str, Any]:
     """The price list as plain values for JSON; values that are not finite become None."""
-    plain: dict[str, Any] = _plain(asdict(prices))
+    plain: dict[str, Any] = _json_value(asdict(prices))
     return plain
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
+        return {key: _json_value(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
+        return [_json_value(inner) for inner in value]
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value

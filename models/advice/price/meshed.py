@@ -12,12 +12,12 @@ from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 
-CELLS = (3, 5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 200)
+CELLS_TRIED = (3, 5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 200)
 """Cells along a contact that are tried, and those of the scene."""
 STEP_FACTORS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
 """Steps that are tried, by the scene's own; without cells, halvings of the shortest too."""
-HALVINGS = 8
-FIRST_CELLS, RUNGS, SURE = 12, 5, 6.0
+STEP_HALVINGS = 8
+FIRST_CELLS, REFERENCE_RUNGS, CONFIRMATION_DIVISOR = 12, 5, 6.0
 """Cells of the reference's first rung, how many rungs there are, and the part of a tolerance that the last one may
 change: the error that is left is a third of that."""
 REFINED_TOGETHER, OTHER_METHOD = "RK4 with cells and steps refined together", "DOP853"
@@ -79,16 +79,19 @@ class MeshedScene(ABC):
     @cached_property
     def steps(self) -> dict[str, float]:
         """Steps (s) by the name of the method; each is a whole fraction of ``first``."""
-        steps = dict.fromkeys(self._part(self.step * k) for k in STEP_FACTORS)
+        steps = dict.fromkeys(self._longest_fraction(self.step * k) for k in STEP_FACTORS)
         return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[SettingLadder]:
         """A ladder of cells for every engine and step or, without cells, a ladder of steps for every engine."""
         if not self.cells:
-            steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, HALVINGS)))
-            return [SettingLadder(engine, "RK4", steps, 4, default=self._part(self.step)) for engine in self.engines]
-        values = tuple(1.0 / n for n in sorted({*CELLS, self.cells}))
-        usual = f"RK4 at {1e3 * self._part(self.step):.3g} ms"
+            steps = (*self.steps.values(), *(min(self.steps.values()) / 2**k for k in range(1, STEP_HALVINGS)))
+            return [
+                SettingLadder(engine, "RK4", steps, 4, default=self._longest_fraction(self.step))
+                for engine in self.engines
+            ]
+        values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, self.cells}))
+        usual = f"RK4 at {1e3 * self._longest_fraction(self.step):.3g} ms"
         return [
             SettingLadder(engine, method, values, 2, default=1.0 / self.cells if method == usual else 0.0, cells=True)
             for engine in self.engines
@@ -101,15 +104,15 @@ class MeshedScene(ABC):
         """
         if not self.cells:
             return SettingLadder(
-                self.reference_engine, "RK4", tuple(self._part(self.longest) / 2**k for k in range(16)), 4
+                self.reference_engine, "RK4", tuple(self._longest_fraction(self.longest) / 2**k for k in range(16)), 4
             )
         return SettingLadder(
             self.reference_engine,
             REFINED_TOGETHER,
-            tuple(1.0 / (FIRST_CELLS * 2**k) for k in range(RUNGS)),
+            tuple(1.0 / (FIRST_CELLS * 2**k) for k in range(REFERENCE_RUNGS)),
             2,
             cells=True,
-            sure=SURE,
+            confirmation_divisor=CONFIRMATION_DIVISOR,
         )
 
     def second(self, reference_setting: Setting) -> Setting | None:
@@ -125,9 +128,9 @@ class MeshedScene(ABC):
         cells = round(1.0 / setting.value) if self.cells else 0
         rung = round(math.log2(cells / FIRST_CELLS)) if self.cells else 0
         if setting.method == OTHER_METHOD:
-            return cells, self.exact(cells, self._tied(rung) if self.cells else setting.value, duration)
+            return cells, self.exact(cells, self._step_tied_to_cells(rung) if self.cells else setting.value, duration)
         if setting.method == REFINED_TOGETHER:
-            return cells, self.run(setting.engine, cells, self._tied(rung), duration)
+            return cells, self.run(setting.engine, cells, self._step_tied_to_cells(rung), duration)
         return cells, self.run(setting.engine, cells, self.steps.get(setting.method, setting.value), duration)
 
     def answer(self, solution: Any) -> PricedRun:
@@ -136,15 +139,15 @@ class MeshedScene(ABC):
         times, values, asked = self.read(run)
         return PricedRun(times, values, {"force calls": asked, "contact cells": asked * cells**2})
 
-    def _tied(self, rung: int) -> float:
-        return self._part(self.longest) / 2 ** (max(0, rung) // 2)
+    def _step_tied_to_cells(self, rung: int) -> float:
+        return self._longest_fraction(self.longest) / 2 ** (max(0, rung) // 2)
 
-    def _part(self, step: float) -> float:
+    def _longest_fraction(self, step: float) -> float:
         """The longest whole fraction (s) of ``first`` that is at most ``step`` (s)."""
         return self.first / math.ceil(self.first / step * (1 - 1e-9))
 
 
-def chosen(quantity: str, known: dict[str, Any]) -> str:
+def checked_quantity(quantity: str, known: dict[str, Any]) -> str:
     """The name of a quantity that a scene has; InputError for an unknown one."""
     if quantity not in known:
         raise InputError("--quantity", "", quantity, "is no quantity of this scene: one of them", tuple(known))

@@ -22,7 +22,7 @@ import numpy as np
 from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.search import Search, TriedSetting
-from models.advice.price.truth import ReferenceTruth, truth
+from models.advice.price.truth import ReferenceTruth, reference_truth
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, modules_of
 from models.ensemble.runner import block_results
@@ -33,7 +33,7 @@ CLOSE_SECONDS_RATIO = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
 DEFAULT_SECONDS_RATIO = 8.0
 """The same for a default: it must never be given up because one run of it was disturbed."""
-ROUNDS, SHORTEST_TURN = 9, 0.002
+TIMING_ROUNDS, SHORTEST_TURN = 9, 0.002
 """Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
 FEWEST_ROUNDS, LONG_ROUNDS_SECONDS = 3, 5.0
 """Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
@@ -41,14 +41,14 @@ DROPPED_SECONDS_RATIO, DEFAULT_DROPPED_RATIO = 1.5, 3.0
 """What took so many times the seconds of its engine's best in the first rounds is out of the race; a default later."""
 SLOWER_RATIO = 1.05
 """A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
-ATTEMPTS = 6
+MOST_CONFIRMATIONS = 6
 """Settings that are confirmed over the whole run, at most, for one recommendation."""
-RESOLVED = 3.0
+RESOLUTION_FACTOR = 3.0
 """An error is told against a truth which is known that many times better, where one can be had within
 LONG_ROUNDS_SECONDS."""
-SHARED = 8
+UNTIMED_RUNS_AT_ONCE = 8
 """Runs at once that are not timed, about: two settings of a reference, or two for each engine."""
-DEARER = 8.0
+REFINEMENT_COST = 8.0
 """A finer reference takes at most about so many times the seconds: twice the cells, half the step."""
 
 
@@ -91,7 +91,7 @@ class Recommendation:
 
     scene: PricedScene
     tolerance: float
-    searched: ReferenceTruth
+    search_truth: ReferenceTruth
     truth: ReferenceTruth
     winners: Winners
     defaults: dict[str, Default]
@@ -111,12 +111,12 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     """
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
-    to_price = priced(scene, quantity, engines)
-    with Crew.of(scene, usual=1).at_work(SHARED, *places_of(scene)) as pool:
+    to_price = priced_scene(scene, quantity, engines)
+    with Crew.of(scene, usual=1).at_work(UNTIMED_RUNS_AT_ONCE, *places_of(scene)) as pool:
         return recommend(to_price, tolerance, pool)
 
 
-def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
+def priced_scene(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> PricedScene:
     """A scene in the form that the search needs, made by its system's module; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
@@ -134,14 +134,14 @@ def recommend(scene: PricedScene, tolerance: float, executor: Executor | None = 
 
     executor : computes what is not timed.
     """
-    searched = known = truth(scene, tolerance, scene.first, executor=executor)
-    search = Search(scene, searched, tolerance, scene.first).everything()
+    searched = known = reference_truth(scene, tolerance, scene.first, executor=executor)
+    search = Search(scene, searched, tolerance, scene.first).search_all_ladders()
     timed = _timed_settings(search)
     engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
-    winners = _winners(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
+    winners = _cheapest_by_key(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.whole > scene.first * (1 + 1e-9) and winners:
-        known, timed, winners = _confirmed(search, timed, winners, executor)
-    known, timed, winners = _resolved(scene, known, timed, winners, executor)
+        known, timed, winners = _confirmed_over_whole_run(search, timed, winners, executor)
+    known, timed, winners = _with_finer_truth(scene, known, timed, winners, executor)
     defaults = {
         ladder.engine: settings
         for ladder in scene.ladders()
@@ -155,14 +155,14 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     rounds.
     """
     curves: dict[str, TriedSetting] = {}
-    for attempt in search.meeting():
+    for attempt in search.settings_that_meet():
         coarsest = curves.setdefault(attempt.setting.curve, attempt)
         if attempt.setting.value > coarsest.setting.value:
             curves[attempt.setting.curve] = attempt
     if not curves:
         return []
     attempts = list(curves.values())
-    taken, longer = _raced(search, _rivals(attempts)), search.scene.whole / search.duration
+    taken, longer = _interleaved_seconds(search, _fastest_candidates(attempts)), search.scene.whole / search.duration
     seconds = [tuple(longer * taken.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts]
     return [
         SettingChoice(attempt, attempt.error, longer * attempt.calls, float(np.median(took)), False, took)
@@ -170,7 +170,7 @@ def _timed_settings(search: Search) -> list[SettingChoice]:
     ]
 
 
-def _rivals(attempts: list[TriedSetting]) -> list[TriedSetting]:
+def _fastest_candidates(attempts: list[TriedSetting]) -> list[TriedSetting]:
     """Settings that may be an engine's fastest, or the fastest of all; none where there is only one candidate."""
     rivals = dict[TriedSetting, None]()
     for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
@@ -185,9 +185,9 @@ def _rivals(attempts: list[TriedSetting]) -> list[TriedSetting]:
     return list(rivals)
 
 
-def _raced(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
+def _interleaved_seconds(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarray]:
     """Seconds of each setting in a few rounds, and in more rounds for those that are not far behind the fastest."""
-    seconds = _rounds(search, rivals, FEWEST_ROUNDS)
+    seconds = _seconds_by_round(search, rivals, FEWEST_ROUNDS)
     middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
     least: dict[str, float] = {}
     for setting, took in middle.items():
@@ -199,23 +199,23 @@ def _raced(search: Search, rivals: list[TriedSetting]) -> dict[Setting, np.ndarr
         <= (DEFAULT_DROPPED_RATIO if attempt.setting.default else DROPPED_SECONDS_RATIO) * least[attempt.setting.engine]
     ]
     more = (
-        min(ROUNDS, int(LONG_ROUNDS_SECONDS / max(sum(middle[attempt.setting] for attempt in left), 1e-9)))
+        min(TIMING_ROUNDS, int(LONG_ROUNDS_SECONDS / max(sum(middle[attempt.setting] for attempt in left), 1e-9)))
         - FEWEST_ROUNDS
     )
-    further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
+    further = _seconds_by_round(search, left, more) if more > 0 and len(left) > 1 else {}
     return seconds | {
         setting: np.concatenate((seconds[setting], seconds_again)) for setting, seconds_again in further.items()
     }
 
 
-def _rounds(search: Search, rivals: list[TriedSetting], rounds: int) -> dict[Setting, np.ndarray]:
+def _seconds_by_round(search: Search, rivals: list[TriedSetting], rounds: int) -> dict[Setting, np.ndarray]:
     jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
     lasted = [attempt.seconds for attempt in rivals]
     taken = interleave(jobs, rounds, SHORTEST_TURN, lasted=lasted, clock=time.process_time)
     return dict(zip((attempt.setting for attempt in rivals), taken, strict=True))
 
 
-def _winners(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
+def _cheapest_by_key(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
     """The cheapest setting for every pair of engine and cost in ``keys`` that has any."""
     return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
 
@@ -229,12 +229,12 @@ def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoi
         return None
     best = min(able, key=lambda choice: getattr(choice, kind))
     usual = [
-        choice for choice in able if choice.tried.setting.default and kind == "seconds" and not _slower(choice, best)
+        choice for choice in able if choice.tried.setting.default and kind == "seconds" and not _is_slower(choice, best)
     ]
     return min(usual, key=lambda choice: choice.seconds) if usual else best
 
 
-def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
+def _is_slower(choice: SettingChoice, best: SettingChoice) -> bool:
     """Whether a setting takes longer than another: significantly so, where both were timed in the same rounds."""
     both = min(len(choice.rounds), len(best.rounds))
     if both < FEWEST_ROUNDS:
@@ -242,16 +242,18 @@ def _slower(choice: SettingChoice, best: SettingChoice) -> bool:
     return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER_RATIO
 
 
-Known = tuple[ReferenceTruth, list[SettingChoice], Winners]
+TruthAndOutcomes = tuple[ReferenceTruth, list[SettingChoice], Winners]
 
 
-def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None) -> Known:
+def _confirmed_over_whole_run(
+    search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+) -> TruthAndOutcomes:
     """The winners and defaults after runs over the whole scene, refined until they meet the tolerance there; with the
     truth.
     """
     scene = search.scene
     rung = max(0, search.truth.rung - 1)
-    known = truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
+    known = reference_truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
     able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed, winners)}
     over = Search(scene, known, search.tolerance, scene.whole)
@@ -259,7 +261,7 @@ def _confirmed(search: Search, timed: list[SettingChoice], winners: Winners, exe
     confirmed = block_results(partial(_valid_over_run, over), blocks, executor)
     held = [each.choice for each in confirmed if each.choice is not None]
     search.tried += [attempt for each in confirmed for attempt in each.failed]
-    return known, held, _winners(held, winners)
+    return known, held, _cheapest_by_key(held, winners)
 
 
 def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
@@ -268,7 +270,7 @@ def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[
 
 
 @dataclass(frozen=True)
-class _Confirmed:
+class _ConfirmedSetting:
     """A setting that meets the tolerance over the whole run, None where there is none, and attempts that failed for
     other reasons than their error.
     """
@@ -277,38 +279,38 @@ class _Confirmed:
     failed: list[TriedSetting] = field(default_factory=list)
 
 
-def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _Confirmed:
+def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) -> _ConfirmedSetting:
     """The setting, or the next finer one of its method, that meets the tolerance over the whole run.
 
     The seconds of all attempts are scaled from the rounds in which the first one was timed.
     """
     (ladder, choice), failed = block, list[TriedSetting]()
     i, first = ladder.values.index(choice.tried.setting.value), choice.tried
-    for _ in range(ATTEMPTS):
+    for _ in range(MOST_CONFIRMATIONS):
         ratio = ladder.work(first.setting.value, ladder.values[i])
         now = search.attempt(ladder.setting(i))
         now = replace(now, seconds=ratio * choice.seconds) if now.seconds else now
         failed += [now] if now.status != "ok" else []
         if search.meets(now):
             rounds = tuple(ratio * s for s in choice.rounds)
-            return _Confirmed(SettingChoice(now, now.error, now.calls, now.seconds, True, rounds), failed)
+            return _ConfirmedSetting(SettingChoice(now, now.error, now.calls, now.seconds, True, rounds), failed)
         finer = (now.error / search.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
         if i < 0:
             break
-    return _Confirmed(None, failed)
+    return _ConfirmedSetting(None, failed)
 
 
-def _resolved(
+def _with_finer_truth(
     scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
-) -> Known:
+) -> TruthAndOutcomes:
     """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
     be far better than its tolerance asks, and as good as the reference that it was compared with.
     """
     shown = _winners_and_defaults(timed, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
-    if _blurred(truth, errors):
+    if _is_blurred(truth, errors):
         answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
         truth, errors = _finer_truth(scene, truth, answers, executor)
     told = {
@@ -326,13 +328,13 @@ def _whole_answer(scene: PricedScene, setting: Setting) -> PricedRun:
     return scene.answer(scene.solve(setting, scene.whole))
 
 
-def _blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
+def _is_blurred(truth: ReferenceTruth, errors: dict[Setting, float]) -> bool:
     """Whether the smallest error is too close to the uncertainty of the truth, and a better truth would take seconds,
     not minutes.
     """
     return (
-        min(errors.values(), default=np.inf) < RESOLVED * truth.uncertainty
-        and DEARER * truth.seconds < LONG_ROUNDS_SECONDS
+        min(errors.values(), default=np.inf) < RESOLUTION_FACTOR * truth.uncertainty
+        and REFINEMENT_COST * truth.seconds < LONG_ROUNDS_SECONDS
     )
 
 
@@ -341,10 +343,10 @@ def _finer_truth(
 ) -> tuple[ReferenceTruth, dict[Setting, float]]:
     """A truth that is exact enough for the errors of all answers, or the best that time allows, and these errors."""
     errors = {setting: known.error(answer) for setting, answer in answers.items()}
-    while _blurred(known, errors):
+    while _is_blurred(known, errors):
         try:
-            tolerance = scene.reference().sure * known.uncertainty
-            finer = truth(scene, tolerance, scene.whole, known.rung, second_method=False, executor=executor)
+            tolerance = scene.reference().confirmation_divisor * known.uncertainty
+            finer = reference_truth(scene, tolerance, scene.whole, known.rung, second_method=False, executor=executor)
         except (InputError, RunFailed):
             break  # as well known as rounding and the reference's finest step let it be
         if not finer.uncertainty < known.uncertainty:

@@ -16,19 +16,26 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.advice.price.curves import HOLLOW, ToleranceCost, coinciding, observed_order, pareto, reach
+from models.advice.price.curves import (
+    UNCERTAINTY_FACTOR,
+    ToleranceCost,
+    coinciding_curves,
+    observed_order,
+    pareto,
+    reach,
+)
 from models.advice.price.problem import Problem, Setting
-from models.core.assumptions import breaches
+from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
-Reaches = dict[str, ToleranceCost]
-WORK = ("contact cells", "force calls")
+CostsAtTolerance = dict[str, ToleranceCost]
+WORK_COUNTS = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
-RIVALS = ("exudyn", "mujoco")
+COMPARED_ENGINES = ("exudyn", "mujoco")
 """Engines whose own cheapest setting is told, where a problem has them."""
-CLOCK = time.process_time
+PROCESSOR_CLOCK = time.process_time
 """Seconds of the processor: what else the machine does is not in them, nor in which settings have rounds."""
 CLOSE_SECONDS_RATIO = 1.25
 """A curve that takes up to so many times the least seconds in one run may be the cheapest: rounds tell."""
@@ -39,7 +46,7 @@ LONG_RUN_SECONDS = 0.25
 """A setting that takes longer (s) has rounds for the tolerance in the middle alone, which the rows are about."""
 FEWEST_ROUNDS = 5
 """With fewer rounds no interval is told: that of one would look exact."""
-DRAWS = 200
+BOOTSTRAP_DRAWS = 200
 """Bootstrapped sets of rounds behind the interval of an interpolated ratio."""
 
 
@@ -114,7 +121,7 @@ class MeasuredPoints:
     @property
     def costs(self) -> tuple[str, str]:
         """Names of the two kinds of cost: the count that measures the work, and seconds."""
-        return next(kind for kind in WORK if any(kind in p.counts for p in self.points)), "seconds"
+        return next(kind for kind in WORK_COUNTS if any(kind in p.counts for p in self.points)), "seconds"
 
     @property
     def defaults(self) -> dict[str, Point]:
@@ -125,9 +132,9 @@ class MeasuredPoints:
         """Error of a point in the quantity to which the tolerances apply."""
         return p.errors[self.quantity]
 
-    def floor(self, quantity: str = "") -> float:
+    def judging_floor(self, quantity: str = "") -> float:
         """Error of a quantity below which the reference is too uncertain to judge."""
-        return HOLLOW * self.uncertainty[quantity or self.quantity]
+        return UNCERTAINTY_FACTOR * self.uncertainty[quantity or self.quantity]
 
     def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
         """Points of each curve with this status, from coarse to fine; None means any status."""
@@ -139,29 +146,29 @@ class MeasuredPoints:
 
     def front(self, kind: str) -> list[Point]:
         """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
-        ``floor``.
+        ``judging_floor``.
         """
-        clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.floor()]
+        clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.judging_floor()]
         return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
 
-    def orders(self, quantity: str) -> dict[str, float]:
+    def observed_orders(self, quantity: str) -> dict[str, float]:
         """Observed order of convergence of each curve: in the step, or in 1 / force calls for adaptive methods."""
         orders = {}
         for curve, points in self.curves().items():
             sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
-            orders[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.floor(quantity))
+            orders[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.judging_floor(quantity))
         return orders
 
-    def same(self) -> list[tuple[str, ...]]:
-        """Groups of curves that coincide, judged on the points whose errors are above ``floor``."""
-        return coinciding(
+    def coinciding_curves(self) -> list[tuple[str, ...]]:
+        """Groups of curves that coincide, judged on the points whose errors are above ``judging_floor``."""
+        return coinciding_curves(
             {
-                curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.floor()}
+                curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.judging_floor()}
                 for curve, points in self.curves().items()
             }
         )
 
-    def miscounted(self) -> list[str]:
+    def miscounted_methods(self) -> list[str]:
         """Texts on settings of methods with fixed stages whose number of force calls is not stages times steps."""
         wrong = []
         for p in self.points:
@@ -172,15 +179,15 @@ class MeasuredPoints:
                 wrong.append(f"{p.setting.curve} {p.setting.label()}: {told}")
         return wrong
 
-    def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
+    def reaches(self, target: float, kind: str, extrapolate: bool = False) -> CostsAtTolerance:
         """Cost of the kind ``kind`` at which each curve meets ``target``; curves that do not meet it are left out."""
         reaches = {
-            curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
+            curve: self._cost_at_tolerance(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
         }
         return {curve: least for curve, least in reaches.items() if least is not None}
 
-    def _reach(
+    def _cost_at_tolerance(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
         """Cost at which the points of one curve meet a target, by ``curves.reach``."""
@@ -192,30 +199,30 @@ class MeasuredPoints:
         """Loss of the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines); None if no
         curve meets the target.
         """
-        best = cheapest(self.reaches(target, kind), engine)
+        best = cheapest_curve(self.reaches(target, kind), engine)
         usual = self.reaches(target, kind, extrapolate=True).get(default)
         if best is None or usual is None:
             return None
         factor = low = high = usual.cost / best[1].cost
         if kind == "seconds" and best[0] != default:
-            pair = [resting(self.curves()[curve], least) for curve, least in ((default, usual), best)]
+            pair = [bracketing_points(self.curves()[curve], least) for curve, least in ((default, usual), best)]
             rounds = min(len(p.seconds) for side in pair for p in side)
             if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
-            sides = [self._resampled(side, target, rounds) for side in pair]
+            sides = [self._bootstrapped_seconds(side, target, rounds) for side in pair]
             factor, low, high = interval(sides[0] / sides[1])
         return Loss(factor, low, high, usual.how)
 
-    def _resampled(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
+    def _bootstrapped_seconds(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
         """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
         bootstrap sample of the rounds that both have.
         """
         kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
-        medians = np.array([np.median(seconds[resamples(rounds, DRAWS)], axis=1) for seconds in kept])
-        cheapest_reaches = [self._reach(side, target, costs) for costs in medians.T]
+        medians = np.array([np.median(seconds[resamples(rounds, BOOTSTRAP_DRAWS)], axis=1) for seconds in kept])
+        cheapest_reaches = [self._cost_at_tolerance(side, target, costs) for costs in medians.T]
         return np.array([least.cost for least in cheapest_reaches if least is not None])
 
-    def racing(self) -> list[Point]:
+    def points_to_time(self) -> list[Point]:
         """Points that are timed in several rounds because their seconds in a single run are decisive: default settings,
         points that determine the cheapest settings and those little slower, of each engine and of all, points that
         determine a refined default, and those on the figure's front that are not slow. Runs longer than
@@ -227,29 +234,29 @@ class MeasuredPoints:
         ]
         for target in self.tolerances:
             met, refined = (self.reaches(target, "seconds", extrapolate) for extrapolate in (False, True))
-            near: Reaches = {}
-            for engine in ("", *RIVALS, *(p.setting.engine for p in usual)):
+            near: CostsAtTolerance = {}
+            for engine in ("", *COMPARED_ENGINES, *(p.setting.engine for p in usual)):
                 near |= _nearly_cheapest(met, engine)
             near |= {p.setting.curve: refined[p.setting.curve] for p in usual if p.setting.curve in refined}
-            rests = (p for curve, least in near.items() for p in resting(curves[curve], least))
+            rests = (p for curve, least in near.items() for p in bracketing_points(curves[curve], least))
             chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG_RUN_SECONDS]
         return list({p.setting: p for p in chosen}.values())
 
 
-def measured(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
+def measured_points(problem: Problem, points: Iterable[Point]) -> MeasuredPoints:
     """The points of a problem, with the facts about it."""
     told = {each.name: getattr(problem, each.name) for each in fields(MeasuredPoints) if each.name != "points"}
     return MeasuredPoints(**told, points=list(points))
 
 
-TUPLES = ("seconds", "broken")
+TUPLE_KEYS = ("seconds", "broken")
 """What JSON keeps as lists."""
 
 
 def of_saved(dictionary: dict[str, Any]) -> MeasuredPoints:
     """A ``MeasuredPoints`` from the dictionary that ``dataclasses.asdict`` made from it."""
     points = [
-        Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLES})
+        Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLE_KEYS})
         for p in dictionary["points"]
     ]
     return MeasuredPoints(**{**dictionary, "points": points})
@@ -259,11 +266,11 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """Try one setting. Its status is ok, raised (the run failed with a message), refused (it was not run), flagged (the
     solution has a ``doubt``), or SILENT (the answer is not finite, or absurd, without any message).
     """
-    begun = CLOCK()
+    begun = PROCESSOR_CLOCK()
     try:
-        with breaches() as broken:
+        with collected_breaches() as broken:
             solution = problem.build(setting).run()
-            seconds, errors = CLOCK() - begun, problem.errors(solution)
+            seconds, errors = PROCESSOR_CLOCK() - begun, problem.errors(solution)
     except InputError as error:
         return Point(setting, "refused", str(error))
     except RunFailed as error:
@@ -299,8 +306,8 @@ def measure(problem: Problem, quick: bool, rounds: int, minimum_seconds: float) 
     settings = problem.settings(quick)
     for first in {setting.curve: setting for setting in reversed(settings)}.values():
         attempt(problem, first)  # imports and compiled code are loaded before anything is timed
-    once = measured(problem, [attempt(problem, setting) for setting in settings])
-    rerun = _timed_points(problem, once.racing(), rounds, minimum_seconds)
+    once = measured_points(problem, [attempt(problem, setting) for setting in settings])
+    rerun = _timed_points(problem, once.points_to_time(), rounds, minimum_seconds)
     return replace(once, points=[rerun.get(p.setting, p) for p in once.points])
 
 
@@ -317,7 +324,7 @@ def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_se
     apart = -(-rounds // FEWEST_ROUNDS) if rounds >= FEWEST_ROUNDS else rounds
     every = [apart if seconds > SLOW_RUN_SECONDS else 1 for seconds in lasted]
     jobs = [partial(run, p.setting) for p in points]
-    timed = interleave(jobs, rounds, minimum_seconds, lasted=lasted, round_interval=every, clock=CLOCK)
+    timed = interleave(jobs, rounds, minimum_seconds, lasted=lasted, round_interval=every, clock=PROCESSOR_CLOCK)
     return {
         p.setting: replace(
             p,
@@ -329,9 +336,9 @@ def _timed_points(problem: Problem, points: list[Point], rounds: int, minimum_se
     }
 
 
-def _nearly_cheapest(reaches: Reaches, engine: str) -> Reaches:
+def _nearly_cheapest(reaches: CostsAtTolerance, engine: str) -> CostsAtTolerance:
     """The cheapest curve of one engine, or of all, and the curves that are little slower."""
-    best = cheapest(reaches, engine)
+    best = cheapest_curve(reaches, engine)
     return {
         curve: least
         for curve, least in reaches.items()
@@ -339,14 +346,14 @@ def _nearly_cheapest(reaches: Reaches, engine: str) -> Reaches:
     }
 
 
-def resting(points: list[Point], cheapest_reach: ToleranceCost) -> list[Point]:
+def bracketing_points(points: list[Point], cheapest_reach: ToleranceCost) -> list[Point]:
     """The one or two points of a curve between which the cost of meeting a tolerance is interpolated."""
     coarser = [p for p in points if p.setting.value >= cheapest_reach.value * (1 - 1e-12)]
     finer = [p for p in points if p.setting.value <= cheapest_reach.value * (1 + 1e-12)]
     return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
 
 
-def cheapest(reaches: Reaches, engine: str = "") -> tuple[str, ToleranceCost] | None:
+def cheapest_curve(reaches: CostsAtTolerance, engine: str = "") -> tuple[str, ToleranceCost] | None:
     """The curve that meets a tolerance at the least cost, among those of one engine or of all engines."""
     able = [item for item in reaches.items() if item[0].startswith(engine)]
     return min(able, key=lambda item: item[1].cost, default=None)

@@ -10,14 +10,14 @@ from models.advice.price import PricedScene, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.runner import Status
 from models.advice.price.truth import ReferenceTruth
-from models.core.assumptions import breaches
+from models.core.assumptions import collected_breaches
 from models.core.errors import InputError, RunFailed
 
-START = 2e-3
+FIRST_STEP = 2e-3
 """s: the step that is tried first; an engine's default method begins with its default step."""
 FIRST_CELLS_SHARE = 1 / 11
 """Of a contact: the cells that are tried first."""
-LOOSE = 1e-3
+FIRST_TOLERANCE = 1e-3
 """The tolerance that an adaptive method is tried with first."""
 GIVEN_UP_RATIO = 2.0
 """A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
@@ -56,23 +56,23 @@ class Search:
     tried: list[TriedSetting] = field(default_factory=list)
 
     @property
-    def held(self) -> float:
+    def largest_allowed_error(self) -> float:
         """Largest error that a setting may show: the tolerance less the uncertainty of the truth."""
         return self.tolerance - self.truth.uncertainty
 
-    def everything(self) -> "Search":
+    def search_all_ladders(self) -> "Search":
         """Search every ladder, methods of high order first. Their cost decides where other ladders are given up."""
         for ladder in {each.engine: each for each in self.scene.ladders()}.values():
-            self._warm(ladder)
+            self._warm_up(ladder)
         for ladder in sorted(self.scene.ladders(), key=lambda each: (each.adaptive, -each.order)):
-            self.climb(ladder)
+            self.search_ladder(ladder)
         return self
 
     def attempt(self, setting: Setting) -> TriedSetting:
         """Try a setting and record its outcome."""
         begun = time.process_time()
         try:
-            with breaches() as broken:
+            with collected_breaches() as broken:
                 solution = self.scene.solve(setting, self.duration)
                 seconds, answer = time.process_time() - begun, self.scene.answer(solution)
         except InputError as error:
@@ -92,23 +92,25 @@ class Search:
         self.tried.append(attempt)
         return attempt
 
-    def _warm(self, ladder: SettingLadder) -> None:
+    def _warm_up(self, ladder: SettingLadder) -> None:
         """Run once without timing, since the first run of an engine imports and compiles."""
         with suppress(InputError, RunFailed):
-            self.scene.solve(ladder.setting(_next(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration)
+            self.scene.solve(
+                ladder.setting(_next_rung(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration
+            )
 
-    def climb(self, ladder: SettingLadder) -> None:
+    def search_ladder(self, ladder: SettingLadder) -> None:
         """Find a ladder's coarsest setting that meets the tolerance, nearly by bisection. The declared order, or
         another engine with the same method, predicts which rung to try next.
         """
-        low, high, last, same = 0, len(ladder.values), None, self._elsewhere(ladder)
+        low, high, last, same = 0, len(ladder.values), None, self._value_in_another_engine(ladder)
         while low < high:
-            i = _next(ladder, low, high, last, self.tolerance)
+            i = _next_rung(ladder, low, high, last, self.tolerance)
             if same and (last is not None or not ladder.default):
-                i, same = _rung(ladder, same, low, high), 0.0
-            if ladder.default and last is not None and self.meeting(ladder.engine):
-                i = min(i, self._affordable(ladder, last))
-            if i < low or self._hopeless(ladder, i, last) or self._too_long(ladder, i, last):
+                i, same = _rung_for_target(ladder, same, low, high), 0.0
+            if ladder.default and last is not None and self.settings_that_meet(ladder.engine):
+                i = min(i, self._finest_affordable_rung(ladder, last))
+            if i < low or self._is_hopeless(ladder, i, last) or self._too_long(ladder, i, last):
                 return
             last = self.attempt(ladder.setting(i))
             if self.meets(last):
@@ -118,41 +120,45 @@ class Search:
             else:
                 low = i + 1
 
-    def meeting(self, engine: str = "") -> list[TriedSetting]:
+    def settings_that_meet(self, engine: str = "") -> list[TriedSetting]:
         """Outcomes of the settings, of one engine or of all, that meet the tolerance."""
         return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
     def meets(self, attempt: TriedSetting) -> bool:
         """Whether a setting meets the tolerance and keeps the assumptions that the reference keeps."""
-        return attempt.status == "ok" and attempt.error <= self.held
+        return attempt.status == "ok" and attempt.error <= self.largest_allowed_error
 
-    def _elsewhere(self, ladder: SettingLadder) -> float:
+    def _value_in_another_engine(self, ladder: SettingLadder) -> float:
         """The setting's value that the same method needs in another engine, 0 where none has it."""
-        alike = [attempt.setting.value for attempt in self.meeting() if attempt.setting.method == ladder.method]
+        alike = [
+            attempt.setting.value for attempt in self.settings_that_meet() if attempt.setting.method == ladder.method
+        ]
         return max((value for value in alike if value in ladder.values), default=0.0)
 
-    def _affordable(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
+    def _finest_affordable_rung(self, ladder: SettingLadder, last_tried: TriedSetting) -> int:
         """The finest rung whose run takes no longer than REFINED_SECONDS, or than the engine's fastest setting that
         meets the tolerance.
         """
-        best = min(attempt.seconds for attempt in self.meeting(ladder.engine))
+        best = min(attempt.seconds for attempt in self.settings_that_meet(ladder.engine))
         most = max(REFINED_SECONDS, best) / max(last_tried.seconds, 1e-9)
         work = [ladder.work(last_tried.setting.value, value) for value in ladder.values]
         return max(i for i, times in enumerate(work) if i == 0 or times <= most)
 
-    def _hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
+    def _is_hopeless(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
         """Whether a rung would cost far more than another setting of its engine that meets the tolerance."""
-        best = self.meeting(ladder.engine)
+        best = self.settings_that_meet(ladder.engine)
         if last_tried is None or not last_tried.seconds or ladder.default or not best:
             return False
         finer = ladder.work(last_tried.setting.value, ladder.values[i])
-        return all(finer * cost(last_tried) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds, _calls))
+        return all(
+            finer * cost(last_tried) > GIVEN_UP_RATIO * min(map(cost, best)) for cost in (_seconds_of, _calls_of)
+        )
 
     def _too_long(self, ladder: SettingLadder, i: int, last_tried: TriedSetting | None) -> bool:
         """Whether a rung would take minutes although another engine has met the tolerance much faster; if so, this is
         recorded as refused.
         """
-        best = min((attempt.seconds for attempt in self.meeting()), default=float("inf"))
+        best = min((attempt.seconds for attempt in self.settings_that_meet()), default=float("inf"))
         seconds = (
             0.0 if last_tried is None else ladder.work(last_tried.setting.value, ladder.values[i]) * last_tried.seconds
         )
@@ -163,25 +169,29 @@ class Search:
         return True
 
 
-_seconds, _calls = attrgetter("seconds"), attrgetter("calls")
+_seconds_of, _calls_of = attrgetter("seconds"), attrgetter("calls")
 
 
-def _next(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting | None, tolerance: float) -> int:
+def _next_rung(ladder: SettingLadder, low: int, high: int, last_tried: TriedSetting | None, tolerance: float) -> int:
     """The rung to try next: predicted from the last one by the declared order, or the middle rung if that is
     impossible.
     """
     if last_tried is None:
-        wanted = LOOSE if ladder.adaptive else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else START)
+        wanted = (
+            FIRST_TOLERANCE
+            if ladder.adaptive
+            else ladder.default or (FIRST_CELLS_SHARE if ladder.cells else FIRST_STEP)
+        )
     elif last_tried.status == "ok" and last_tried.error > 0.0:
         wanted = last_tried.setting.value * (tolerance / last_tried.error) ** (
             1 / (1 if ladder.adaptive else ladder.order or 2)
         )
     else:
         return (low + high) // 2
-    return _rung(ladder, wanted, low, high)
+    return _rung_for_target(ladder, wanted, low, high)
 
 
-def _rung(ladder: SettingLadder, target: float, low: int, high: int) -> int:
+def _rung_for_target(ladder: SettingLadder, target: float, low: int, high: int) -> int:
     """The coarsest of the remaining rungs that is no coarser than ``target``."""
     i = bisect_left(ladder.values, -target * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)

@@ -12,17 +12,17 @@ from models.machine.seconds import cost
 
 EQUAL_RATIO_MARGIN = 0.005
 """Ratios so near to one are not worth a word."""
-HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
+TABLE_HEADING = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
 
-def lines(recommendation: Recommendation) -> list[str]:
+def recommendation_lines(recommendation: Recommendation) -> list[str]:
     """Text of a recommendation: the cheapest settings, the extra cost of defaults, what failed, and what to write into
     the scene.
     """
     scene = recommendation.scene
     first = (
-        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.searched.how} "
-        f"{recommendation.searched.uncertainty:.1e} {scene.unit}"
+        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.search_truth.origin} "
+        f"{recommendation.search_truth.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
@@ -31,25 +31,25 @@ def lines(recommendation: Recommendation) -> list[str]:
     extent = getattr(scene, "extent", f"over {scene.whole:g} s")
     return [
         f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} {extent}",
-        f"  truth: {recommendation.truth.how} {recommendation.truth.uncertainty:.1e} {scene.unit}",
+        f"  truth: {recommendation.truth.origin} {recommendation.truth.uncertainty:.1e} {scene.unit}",
         *([] if recommendation.whole else [first]),
         *([f"  {scene.note}"] if scene.note else []),
         *([doubt] if recommendation.tolerance >= recommendation.truth.size else []),
-        *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken),
+        *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken_assumptions),
         "",
-        *(_table(recommendation) if recommendation.winners else _none(recommendation)),
-        *_defaults(recommendation),
-        *_failures(recommendation.tried),
+        *(_table(recommendation) if recommendation.winners else _no_setting_lines(recommendation)),
+        *_default_lines(recommendation),
+        *_failure_lines(recommendation.tried),
         *_into_the_scene(recommendation),
     ]
 
 
 def _table(recommendation: Recommendation) -> list[str]:
-    rows, unit = [HEAD.format(counted=recommendation.scene.counted)], recommendation.scene.unit
-    for (engine, kinds), choice in _merged(recommendation.winners).items():
+    rows, unit = [TABLE_HEADING.format(counted=recommendation.scene.counted)], recommendation.scene.unit
+    for (engine, kinds), choice in _merged_winners(recommendation.winners).items():
         who = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
-            f"  {who:<24}{_named(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
+            f"  {who:<24}{_setting_text(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
             f"{choice.calls:>16,.0f}   {cost(choice.rounds or (choice.seconds,))}"
         )
     over = (
@@ -64,7 +64,7 @@ def _table(recommendation: Recommendation) -> list[str]:
     ]
 
 
-def _merged(winners: Winners) -> Winners:
+def _merged_winners(winners: Winners) -> Winners:
     """The winners, with one row instead of two where the same setting is the cheapest by both costs."""
     rows = Winners()
     for (engine, kind), choice in winners.items():
@@ -75,36 +75,38 @@ def _merged(winners: Winners) -> Winners:
     return rows
 
 
-def _none(recommendation: Recommendation) -> list[str]:
+def _no_setting_lines(recommendation: Recommendation) -> list[str]:
     able = [attempt for attempt in recommendation.tried if attempt.status == "ok"]
     if not able:
         return ["  no setting gave an answer"]
     best = min(able, key=lambda attempt: attempt.error)
     return [
-        f"  no setting tried meets the tolerance; the nearest is {_named(best.setting, True)} with "
+        f"  no setting tried meets the tolerance; the nearest is {_setting_text(best.setting, True)} with "
         f"{best.error:.2g} {recommendation.scene.unit}"
     ]
 
 
-def _named(setting: Setting, whole: bool) -> str:
+def _setting_text(setting: Setting, whole: bool) -> str:
     engine = f"{LABELS[setting.engine]} " if whole else ""
     return f"{engine if setting.method != setting.engine else ''}{setting.method}, {setting.label()}"
 
 
-def _defaults(recommendation: Recommendation) -> list[str]:
+def _default_lines(recommendation: Recommendation) -> list[str]:
     rows = [""]
     for engine, default in recommendation.defaults.items():
         tried = default.as_it_is
-        known = max(tried.error, recommendation.searched.uncertainty)
+        known = max(tried.error, recommendation.search_truth.uncertainty)
         error = f"{'' if known == tried.error else 'below '}{known:.2g} {recommendation.scene.unit}"
         over = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
         as_it_is = f"{error}{over}" if tried.status == "ok" else tried.status
-        lost = _lost(recommendation, engine, default.refined, default.extrapolated)
-        rows.append(f"  {LABELS[engine]}'s default, {_named(tried.setting, False)}: {as_it_is}{lost}")
+        lost = _cost_of_default_text(recommendation, engine, default.refined, default.extrapolated)
+        rows.append(f"  {LABELS[engine]}'s default, {_setting_text(tried.setting, False)}: {as_it_is}{lost}")
     return rows if recommendation.defaults else []
 
 
-def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool) -> str:
+def _cost_of_default_text(
+    recommendation: Recommendation, engine: str, refined: SettingChoice | None, extrapolated: bool
+) -> str:
     """Text on the cost of the refined default method, compared with the engine's cheapest setting and with the cheapest
     of all.
     """
@@ -121,7 +123,7 @@ def _lost(recommendation: Recommendation, engine: str, refined: SettingChoice | 
     return f"; {met}: {', '.join(parts) or 'nothing is cheaper'}"
 
 
-def _failures(tried: tuple[TriedSetting, ...]) -> list[str]:
+def _failure_lines(tried: tuple[TriedSetting, ...]) -> list[str]:
     """Lines on settings without an answer, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[TriedSetting]](list)
     for attempt in tried:
@@ -158,30 +160,30 @@ def as_dict(recommendation: Recommendation) -> dict[str, Any]:
         "unit": scene.unit,
         "tolerance": recommendation.tolerance,
         "duration": scene.whole,
-        "truth": recommendation.truth.how,
+        "truth": recommendation.truth.origin,
         "uncertainty": recommendation.truth.uncertainty,
-        "broken assumptions": [asdict(each) for each in recommendation.truth.broken],
+        "broken assumptions": [asdict(each) for each in recommendation.truth.broken_assumptions],
         "cheapest": [
-            {"engine": engine or "all", "by": kind, **_choice(each)}
+            {"engine": engine or "all", "by": kind, **_choice_as_json(each)}
             for (engine, kind), each in recommendation.winners.items()
         ],
         "defaults": {
             engine: {
-                "as it is": _tried(each.as_it_is),
+                "as it is": _tried_as_json(each.as_it_is),
                 "extrapolated": each.extrapolated,
-                "refined": None if each.refined is None else _choice(each.refined),
+                "refined": None if each.refined is None else _choice_as_json(each.refined),
             }
             for engine, each in recommendation.defaults.items()
         },
-        "tried": [_tried(each) for each in recommendation.tried],
+        "tried": [_tried_as_json(each) for each in recommendation.tried],
     }
 
 
-def _choice(choice: SettingChoice) -> dict[str, Any]:
-    return {**_tried(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
+def _choice_as_json(choice: SettingChoice) -> dict[str, Any]:
+    return {**_tried_as_json(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
 
 
-def _tried(attempt: TriedSetting) -> dict[str, Any]:
+def _tried_as_json(attempt: TriedSetting) -> dict[str, Any]:
     setting = {name: getattr(attempt.setting, name) for name in ("engine", "method", "value")}
     told = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
     return {**setting, **told, "error": attempt.error if attempt.status == "ok" else None}

@@ -11,13 +11,13 @@ import numpy as np
 
 from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.core.assumptions import BrokenAssumption, breaches
+from models.core.assumptions import BrokenAssumption, collected_breaches
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
-AGREED = 4.0
+AGREEMENT_FACTOR = 4.0
 """A solver of another family differs by less than this part of the tolerance."""
-NEARLY = 1e-3
+ROW_TIME_ROUNDING = 1e-3
 """Of a row's spacing: times so near to a row are its own, to the rounding of times."""
 MOST_ROWS = 4_000_000
 """Rows of a reference: beyond, it takes gigabytes."""
@@ -25,23 +25,24 @@ MOST_ROWS = 4_000_000
 
 @dataclass(frozen=True)
 class ReferenceTruth:
-    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; how : text on its origin;
+    """Answer of the reference, taken as the truth. uncertainty : in the unit of the quantity; origin : text on its
+    origin;
     rung : of the reference's ladder; kink_period : s between kinks of the quantity, 0 where there are none; seconds :
-    of the processor that it took, a guide to how long to wait and no price; broken : assumptions that the reference
-    breaks, as every correct setting does.
+    of the processor that it took, a guide to how long to wait and no price; broken_assumptions : assumptions that the
+    reference breaks, as every correct setting does.
     """
 
     answer: PricedRun
     uncertainty: float
-    how: str
+    origin: str
     rung: int
     kink_period: float = 0.0
     seconds: float = 0.0
-    broken: tuple[BrokenAssumption, ...] = ()
+    broken_assumptions: tuple[BrokenAssumption, ...] = ()
 
     def beside(self, broken: Mapping[str, BrokenAssumption]) -> list[BrokenAssumption]:
         """Those of the broken assumptions that the reference keeps."""
-        known = {assumption.name for assumption in self.broken}
+        known = {assumption.name for assumption in self.broken_assumptions}
         return [assumption for name, assumption in broken.items() if name not in known]
 
     def error(self, other_answer: PricedRun) -> float:
@@ -66,10 +67,10 @@ def values_at(answer: PricedRun, times: np.ndarray, kink_period: float = 0.0) ->
     step = float(answer.times[-1]) / last
     place = times / step
     index = np.rint(place).astype(int)
-    if np.abs(place - index).max() < NEARLY:
+    if np.abs(place - index).max() < ROW_TIME_ROUNDING:
         return answer.values[np.minimum(index, last)]
     rows = max(3, round(kink_period / step)) if kink_period else last
-    first = np.minimum((place + NEARLY) // rows * rows, last - 3).astype(int)
+    first = np.minimum((place + ROW_TIME_ROUNDING) // rows * rows, last - 3).astype(int)
     left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
     s = place - left
     weights = (
@@ -81,7 +82,7 @@ def values_at(answer: PricedRun, times: np.ndarray, kink_period: float = 0.0) ->
     return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
 
 
-def truth(
+def reference_truth(
     scene: PricedScene,
     tolerance: float,
     duration: float,
@@ -99,7 +100,7 @@ def truth(
     """
     ladder = scene.reference()
     settled, rung, change, seconds, broken = _settled_answer(scene, ladder, tolerance, duration, rung, executor)
-    said = _named(ladder.setting(rung))
+    said = _setting_text(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if second_method else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     finer = ladder.said or finer
@@ -109,13 +110,13 @@ def truth(
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
-    both = f"{said} and {_named(other)}"
-    if differs > tolerance / AGREED:
+    both = f"{said} and {_setting_text(other)}"
+    if differs > tolerance / AGREEMENT_FACTOR:
         raise RunFailed("reference", f"{both} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged")
-    return replace(alone, uncertainty=max(change, differs), how=f"{both}, which differ by")
+    return replace(alone, uncertainty=max(change, differs), origin=f"{both}, which differ by")
 
 
-def _change(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
+def _change_by_halving(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
     """Largest difference between an answer and that with half the step, at the rows of both; the coarser answer is
     interpolated between its rows.
     """
@@ -123,7 +124,7 @@ def _change(scene: PricedScene, coarse: PricedRun, fine: PricedRun) -> float:
     return max(ReferenceTruth(run, 0.0, "", 0, scene.kink_period).error(other) for run, other in both)
 
 
-def _named(setting: Setting) -> str:
+def _setting_text(setting: Setting) -> str:
     return f"{setting.engine} {setting.method} at {setting.label()}"
 
 
@@ -135,12 +136,12 @@ class _Rung(NamedTuple):
     answer: PricedRun | None
     failure: str
     seconds: float
-    broken: dict[str, BrokenAssumption]
+    broken_assumptions: dict[str, BrokenAssumption]
 
 
-def _of_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
+def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _Rung:
     begun = time.process_time()
-    with breaches() as broken:
+    with collected_breaches() as broken:
         try:
             answer = scene.answer(scene.solve(setting, duration))
         except (InputError, RunFailed) as error:
@@ -157,7 +158,7 @@ def _settled_answer(
     before: PricedRun | None = None
     change, failure = float("inf"), ""
     rungs = [i for i in range(rung, len(ladder.values)) if duration / ladder.values[i] <= MOST_ROWS]
-    job = partial(_of_rung, scene, duration)
+    job = partial(_reference_on_rung, scene, duration)
     together = [ladder.setting(i) for i in rungs[:2]] if executor is not None else []
     ready = dict(zip(rungs, block_results(job, together, executor), strict=False))
     for i in rungs:
@@ -166,14 +167,14 @@ def _settled_answer(
             before, failure = None, failed
             continue
         if before is not None:
-            last, change = change, _change(scene, before, now)
-            if change <= tolerance / ladder.sure:
+            last, change = change, _change_by_halving(scene, before, now)
+            if change <= tolerance / ladder.confirmation_divisor:
                 return now, i, change, seconds, broken
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now
     if before is None:
         raise RunFailed("reference", failure or "no step is fine enough")
-    least = f"{ladder.sure * change:.2g} {scene.unit}"
+    least = f"{ladder.confirmation_divisor * change:.2g} {scene.unit}"
     allowed = f"is finer than the scene's own reference can be known here: at least {least}"
     raise InputError("--tolerance", "", tolerance, allowed)

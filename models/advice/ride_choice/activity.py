@@ -11,13 +11,13 @@ Activity knows nothing of the question asked, and ranks elements one by one.
 import numpy as np
 
 from models.advice.ride_choice.reduced import FullScene
-from models.ride.covariance import stationary
+from models.ride.covariance import stationary_covariance
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import FREEDOMS
 from models.vehicles.spatial_linear import slopes_at_rest
 
 
-def activity(full_scene: FullScene) -> dict[str, float]:
+def activity_by_element(full_scene: FullScene) -> dict[str, float]:
     """Activity in watts by element: of springs, dampers, bars and tyres, and of every body's inertia along and about
     each axis.
 
@@ -29,7 +29,7 @@ def activity(full_scene: FullScene) -> dict[str, float]:
         len(full_scene.linear.mass),
         full_scene.full.states,
     )
-    P, A, motion = stationary(system).P[:states, :states], system.A[:states, :states], Kinematics(vehicle)
+    P, A, motion = stationary_covariance(system).P[:states, :states], system.A[:states, :states], Kinematics(vehicle)
     noise, watts = np.hstack([b[n : 2 * n] for b in system.B]), dict[str, float]()
 
     def elastic(name: str, k: float, c: float, row: np.ndarray, road: np.ndarray | float = 0.0) -> None:
@@ -37,7 +37,7 @@ def activity(full_scene: FullScene) -> dict[str, float]:
         ``road``.
         """
         u = np.concatenate([row, np.zeros(states - n)]) - road
-        s_u, s_v = _deviation(u, P), _deviation(u @ A, P)
+        s_u, s_v = _standard_deviation(u, P), _standard_deviation(u @ A, P)
         if k:
             watts[f"spring {name}"] = 2 / np.pi * k * s_u * s_v
         if c:
@@ -64,11 +64,11 @@ def activity(full_scene: FullScene) -> dict[str, float]:
         values = [body.mass] * 3 + list(np.diag(body.inertia))
         for freedom, row, value in zip(FREEDOMS, rows, values, strict=True):
             if row.any() and value:
-                s_a = np.inf if abs(row @ noise).max() > 0 else _deviation(row @ A[n : 2 * n], P)
-                s_v = _deviation(np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)
+                s_a = np.inf if abs(row @ noise).max() > 0 else _standard_deviation(row @ A[n : 2 * n], P)
+                s_v = _standard_deviation(np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)
                 watts[f"inertia {body.name} {freedom}"] = 2 / np.pi * value * s_a * s_v
     return watts
 
 
-def _deviation(row: np.ndarray, P: np.ndarray) -> float:
+def _standard_deviation(row: np.ndarray, P: np.ndarray) -> float:
     return float(np.sqrt(max(row @ P @ row, 0.0)))

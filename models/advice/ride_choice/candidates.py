@@ -12,25 +12,25 @@ import numpy as np
 from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
 from models.advice.ride_choice.reduced import FullScene, Reduced, Vehicles, of_speed
-from models.advice.ride_choice.screen import Screen, confirmed, solved_in_motions, whole_variances
+from models.advice.ride_choice.screen import Screen, exact_variances, solved_in_motions, whole_variances
 from models.core.errors import InputError
-from models.core.runge_kutta import STAGES
+from models.core.runge_kutta import RK4_STAGES
 from models.systems.ride.omissions import effects_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, without
+from models.systems.ride.reduced_scene import Effect, ReducedScene, reduced_without
 from models.systems.ride.scene import RideScene
 
-SCREENED = 3
+SCREENED_SPEEDS = 3
 """Speeds at which effects are screened, from the slowest to the fastest; the choice is confirmed at all."""
 IDENTITY_ERROR = 1e-12
 """Relative error of the identity that certifies a choice; beyond it, rounding has eaten the certificate."""
 VARIANCE_DIFFERENCE = 1e-9
 """By how much a variance by motions may differ from the one in extended precision."""
 
-Set = frozenset[Effect]
+EffectSet = frozenset[Effect]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-def remembered(method: Method) -> Method:
+def cached_in_object(method: Method) -> Method:
     """Decorator of a method whose answers are kept in its object, by their arguments."""
 
     @wraps(method)
@@ -57,7 +57,7 @@ class Candidates:
         self.full_scenes = [FullScene(scene, float(speed), self.vehicles) for speed in speeds]
         names = self.full_scenes[0].full.system.names
         self.quantities, self.rows = tuple(quantities), [names.index(name) for name in quantities]
-        few = min(SCREENED, len(speeds))
+        few = min(SCREENED_SPEEDS, len(speeds))
         self.screened = [self.full_scenes[i] for i in np.linspace(0, len(speeds) - 1, few).round().astype(int)]
         self._suspects, self.full = list(self.screened), list[np.ndarray]()
         for full_scene in self.full_scenes:
@@ -68,7 +68,7 @@ class Candidates:
                     allowed = "has no finite standard deviation above zero in this scene, so nothing to hold it to"
                     raise InputError("", f"quantities.{name}", None, allowed)
         Screen(self.full_scenes[0].full, self.rows)  # refuses a vehicle that cannot be screened
-        plain = [self._plain(name) for name in quantities]
+        plain = [self._row_and_weighting(name) for name in quantities]
         self.near = Neighbourhood(scene, np.asarray(speeds, float), plain, self.vehicles)
 
     @classmethod
@@ -77,7 +77,7 @@ class Candidates:
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.complete(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
-    def _plain(self, quantity: str) -> tuple[int, str]:
+    def _row_and_weighting(self, quantity: str) -> tuple[int, str]:
         """For a quantity, the row of the vehicle's output and the name of its weighting, "" if it has none."""
         weighted = {f"{name} {by}": (name, by) for name, by in self.scene.ride.weighting.items()}
         name, by = weighted.get(quantity, (quantity, ""))
@@ -88,27 +88,27 @@ class Candidates:
         """Counts of the work: eigenvalue problems, one for each vehicle that was made, and Lyapunov equations."""
         return {"eigenvalue problems": len(self.vehicles) + self.near.off, "Lyapunov equations": self.solved_equations}
 
-    @remembered
-    def rest(self, omitted_effects: Set) -> ReducedScene:
+    @cached_in_object
+    def rest(self, omitted_effects: EffectSet) -> ReducedScene:
         """The scene without these effects."""
-        return without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
+        return reduced_without(self.scene, sorted(omitted_effects, key=lambda effect: effect.name))
 
-    @remembered
-    def system(self, full_scene: FullScene, omitted_effects: Set) -> Reduced | None:
+    @cached_in_object
+    def system(self, full_scene: FullScene, omitted_effects: EffectSet) -> Reduced | None:
         """The system of the scene without these effects at a speed; None where no meaningful system remains."""
         try:
             return full_scene.reduced(self.rest(omitted_effects))
         except InputError:
             return None
 
-    def screen(self, full_scene: FullScene, omitted_effects: Set) -> Screen | None:
+    def screen(self, full_scene: FullScene, omitted_effects: EffectSet) -> Screen | None:
         """Covariance and adjoints of the scene without those of these effects that are singular."""
-        base = frozenset(effect for effect in omitted_effects if effect.singular)
+        base = frozenset(effect for effect in omitted_effects if effect.is_singular)
         needs = {name for effect in base for name in effect.needs}
         return self._screen(full_scene, base | {effect for effect in omitted_effects if effect.name in needs})
 
-    @remembered
-    def _screen(self, full_scene: FullScene, base: Set) -> Screen | None:
+    @cached_in_object
+    def _screen(self, full_scene: FullScene, base: EffectSet) -> Screen | None:
         reduced = self.system(full_scene, base)
         self.solved_equations += 1 + len(self.rows)
         try:
@@ -116,18 +116,18 @@ class Candidates:
         except InputError:
             return None
 
-    @remembered
-    def predicted(self, omitted_effects: Set) -> np.ndarray:
+    @cached_in_object
+    def predicted_changes(self, omitted_effects: EffectSet) -> np.ndarray:
         """Predicted changes (quantities,), each the largest over the screened speeds; inf where no system remains."""
         return largest_changes(
             np.array([self._predicted_at(full_scene, omitted_effects) for full_scene in self.screened])
         )
 
-    @remembered
-    def _predicted_at(self, full_scene: FullScene, omitted_effects: Set) -> np.ndarray:
-        return self._change(full_scene, omitted_effects, self._predict)
+    @cached_in_object
+    def _predicted_at(self, full_scene: FullScene, omitted_effects: EffectSet) -> np.ndarray:
+        return self._changes_at_speed(full_scene, omitted_effects, self._predict)
 
-    def share(self, omitted_effects: Set) -> float:
+    def share(self, omitted_effects: EffectSet) -> float:
         """Ratio of the largest predicted change to the tolerance. It is inf once any speed exceeds the tolerance; the
         speed that did so last is tried first.
         """
@@ -140,53 +140,60 @@ class Candidates:
             worst = max(worst, share)
         return worst
 
-    @remembered
-    def confirm(self, omitted_effects: Set) -> np.ndarray:
+    @cached_in_object
+    def confirmed_changes(self, omitted_effects: EffectSet) -> np.ndarray:
         """Changes (quantities,) by the exact solution, each the largest over all listed speeds."""
         return largest_changes(
-            np.array([self._change(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes])
+            np.array(
+                [self._changes_at_speed(full_scene, omitted_effects, self._confirm) for full_scene in self.full_scenes]
+            )
         )
 
-    @remembered
-    def solved(self, omitted_effects: Set) -> np.ndarray:
-        """Changes as ``confirm`` gives them, but computed from eigenmodes of the reduced system wherever these are
-        reliable.
+    @cached_in_object
+    def changes_by_modes(self, omitted_effects: EffectSet) -> np.ndarray:
+        """Changes as ``confirmed_changes`` gives them, but computed from eigenmodes of the reduced system wherever
+        these are reliable.
         """
         return largest_changes(
-            np.array([self._change(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes])
+            np.array(
+                [self._changes_at_speed(full_scene, omitted_effects, self._solve) for full_scene in self.full_scenes]
+            )
         )
 
-    def certified(self, omitted_effects: Set) -> bool:
+    def certified(self, omitted_effects: EffectSet) -> bool:
         """Whether at the screened speeds the identity of covariance and adjoint holds in extended precision, and agrees
         with the variances from eigenmodes.
         """
         return all(self._exact(full_scene, omitted_effects) for full_scene in self.screened)
 
-    def _exact(self, full_scene: FullScene, omitted_effects: Set) -> bool:
+    def _exact(self, full_scene: FullScene, omitted_effects: EffectSet) -> bool:
         screen, reduced = self.screen(full_scene, frozenset()), self.system(full_scene, omitted_effects)
         if screen is None or reduced is None:
             return False
         self.solved_equations += 1 + len(self.rows)
-        two, variance = screen.identity(reduced)
+        two, variance = screen.certificate_sides(reduced)
         by_motions = solved_in_motions(reduced, self.rows)
         same = by_motions is None or bool((abs(by_motions / variance - 1.0) <= VARIANCE_DIFFERENCE).all())
         return same and bool((abs(two / variance - 1.0) <= IDENTITY_ERROR).all())
 
-    def _predict(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
+    def _predict(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         screen = self.screen(full_scene, omitted_effects)
-        return np.full(len(self.rows), inf) if screen is None else screen.predicted(reduced)
+        return np.full(len(self.rows), inf) if screen is None else screen.predicted_variances(reduced)
 
-    def _confirm(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
+    def _confirm(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
-        return confirmed(reduced, self.rows)
+        return exact_variances(reduced, self.rows)
 
-    def _solve(self, full_scene: FullScene, omitted_effects: Set, reduced: Reduced) -> np.ndarray:
+    def _solve(self, full_scene: FullScene, omitted_effects: EffectSet, reduced: Reduced) -> np.ndarray:
         self.solved_equations += 1
         variances = solved_in_motions(reduced, self.rows)
-        return confirmed(reduced, self.rows) if variances is None else variances
+        return exact_variances(reduced, self.rows) if variances is None else variances
 
-    def _change(
-        self, full_scene: FullScene, omitted_effects: Set, variances: Callable[[FullScene, Set, Reduced], np.ndarray]
+    def _changes_at_speed(
+        self,
+        full_scene: FullScene,
+        omitted_effects: EffectSet,
+        variances: Callable[[FullScene, EffectSet, Reduced], np.ndarray],
     ) -> np.ndarray:
         """Changes (quantities,) at a speed by the function ``variances``; inf where no system remains, or an unstable
         one.
@@ -197,16 +204,16 @@ class Candidates:
             left = left if reduced is None else variances(full_scene, omitted_effects, reduced)
         return np.asarray(np.sqrt(left / full) - 1.0)
 
-    @remembered
-    def between(self, omitted_effects: Set) -> np.ndarray:
+    @cached_in_object
+    def between(self, omitted_effects: EffectSet) -> np.ndarray:
         """Changes (quantities,), each the largest over all speeds of the range; inf where no system remains."""
         reduced = self.system(self.full_scenes[0], omitted_effects)
         if reduced is None or not all((d[self.rows] == 0).all() for d in reduced.system.D):
             return np.full(len(self.rows), inf)
         return largest_changes(self.near.changes(self.rest(omitted_effects)))
 
-    @remembered
-    def off(self, omitted_effects: Set) -> np.ndarray:
+    @cached_in_object
+    def off(self, omitted_effects: EffectSet) -> np.ndarray:
         """Changes (quantities,) over all speeds of the range if parameters are off, in the combination that is worst
         for each quantity.
         """
@@ -222,8 +229,8 @@ class Candidates:
         worst = int(abs(changes).argmax())
         return f"{self.quantities[worst]} by {100 * changes[worst]:+.3g} %"
 
-    @remembered
-    def cost(self, omitted_effects: Set) -> Cost:
+    @cached_in_object
+    def cost(self, omitted_effects: EffectSet) -> Cost:
         """Cost without these effects in the largest stable step, at the screened speed where it is highest; infinite
         where no meaningful system remains.
         """
@@ -238,18 +245,20 @@ class Candidates:
         except InputError:
             return Cost(0, 0.0, inf)
 
-    @remembered
-    def accurate(self, omitted_effects: Set) -> Cost:
+    @cached_in_object
+    def cost_at_equal_accuracy(self, omitted_effects: EffectSet) -> Cost:
         """Cost without these effects in the longest step with which reduction and steps together keep the tolerance at
         all screened speeds.
         """
-        return self.at_step(omitted_effects, longest_step(self.marches(omitted_effects), self.exact(), self.tolerance))
+        return self.at_step(
+            omitted_effects, longest_step(self.marches(omitted_effects), self.exact_deviations(), self.tolerance)
+        )
 
-    def exact(self) -> list[np.ndarray]:
+    def exact_deviations(self) -> list[np.ndarray]:
         """Standard deviations (quantities,) of the full scene, for each of the screened speeds."""
         return [np.sqrt(self.full[self.full_scenes.index(full_scene)]) for full_scene in self.screened]
 
-    def marches(self, omitted_effects: Set) -> list[March]:
+    def marches(self, omitted_effects: EffectSet) -> list[March]:
         """Marches of the scene without these effects, one for each of the screened speeds."""
         weightings = tuple((row, by) for row, (_, by) in zip(self.rows, self.near.quantities, strict=True) if by)
         rest = self.rest(omitted_effects)
@@ -258,9 +267,9 @@ class Candidates:
             for full_scene in self.screened
         ]
 
-    def at_step(self, omitted_effects: Set, step: float) -> Cost:
+    def at_step(self, omitted_effects: EffectSet, step: float) -> Cost:
         """Cost without these effects in steps of ``step`` (s)."""
-        return Cost(self.cost(omitted_effects).states, step, STAGES / step if step else inf)
+        return Cost(self.cost(omitted_effects).states, step, RK4_STAGES / step if step else inf)
 
 
 def largest_changes(changes: np.ndarray) -> np.ndarray:

@@ -21,15 +21,15 @@ from math import inf, log
 
 import numpy as np
 
-from models.advice.ride_choice.candidates import Candidates, Set, remembered
+from models.advice.ride_choice.candidates import Candidates, EffectSet, cached_in_object
 from models.advice.ride_choice.march import Cost
-from models.advice.ride_choice.marched import confirms
+from models.advice.ride_choice.marched import confirms_step
 from models.systems.ride.omissions import TYRE_DAMPING
-from models.systems.ride.reduced_scene import Effect, illegal
+from models.systems.ride.reduced_scene import Effect, refusal_reason
 
-ROUNDS = 30
+MOST_CONFIRMATIONS = 30
 """Choices that are confirmed at most."""
-EQUAL_COST_LOG, EVEN = 0.05, 1e-3
+EQUAL_COST_LOG, LARGEST_CALL_RISE = 0.05, 1e-3
 """Logarithm of calls up to which two sets cost the same; by how much, relative, a step that saves states may raise
 them."""
 STEP_FACTOR = 0.9
@@ -37,7 +37,7 @@ STEP_FACTOR = 0.9
 NEGLIGIBLE_SHARE = 1e-3
 """Share of the tolerance below which an error counts as none."""
 
-Saved = Callable[[Set, Set], float]
+SavingOfStep = Callable[[EffectSet, EffectSet], float]
 """What a step saves, from a set to a larger one."""
 
 
@@ -46,23 +46,26 @@ class RideChoice:
     """Result of a choice: effects ``left_out`` of all ``candidates``, and the relative changes (quantities,) of
     standard deviations that result.
 
-    predicted and confirmed : the worst over the listed speeds, with sign; between : over all speeds of their range;
-    off : the same with parameters that are off, where that is worst; within_tolerance : whether all of them are.
-    before, after : cost at equal accuracy; stable : the longest stable steps (s) of both, whatever the accuracy.
-    rounds : choices that were confirmed. said : reasons why promising effects were not left out.
+    predicted_change and confirmed_change : the worst over the listed speeds, with sign; change_between_speeds : over
+    all speeds of their range;
+    change_with_parameters_off : the same with parameters that are off, where that is worst; within_tolerance : whether
+    all of them are.
+    cost_before, cost_after : cost at equal accuracy; stable_steps : the longest stable steps (s) of both, whatever the
+    accuracy.
+    confirmations : choices that were confirmed. said : reasons why promising effects were not left out.
     """
 
     candidates: tuple[Effect, ...]
     left_out: tuple[Effect, ...]
-    predicted: np.ndarray
-    confirmed: np.ndarray
-    between: np.ndarray
-    off: np.ndarray
+    predicted_change: np.ndarray
+    confirmed_change: np.ndarray
+    change_between_speeds: np.ndarray
+    change_with_parameters_off: np.ndarray
     within_tolerance: bool
-    before: Cost
-    after: Cost
-    stable: tuple[float, float]
-    rounds: int
+    cost_before: Cost
+    cost_after: Cost
+    stable_steps: tuple[float, float]
+    confirmations: int
     said: tuple[str, ...]
 
 
@@ -70,22 +73,22 @@ class Chooser(Candidates):
     """Search for candidates that can be left out of a scene."""
 
     @cached_property
-    def refused(self) -> dict[Set, str]:
+    def refusal_reasons(self) -> dict[EffectSet, str]:
         """Sets that kept the tolerance but were refused, with the reasons."""
         return {}
 
     @cached_property
-    def uncertified(self) -> set[Set]:
+    def uncertified_sets(self) -> set[EffectSet]:
         """Sets that kept the tolerance but whose certificate was not exact."""
         return set()
 
     @cached_property
-    def singles(self) -> list[Set]:
+    def single_effect_sets(self) -> list[EffectSet]:
         """For each effect, the set of this effect and of all effects that must be left out with it."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
-    def within_tolerance(self, omitted_effects: Set) -> bool:
+    def within_tolerance(self, omitted_effects: EffectSet) -> bool:
         """Whether the tolerance holds without these effects: at all speeds of the range, with parameters off, and
         without errors that cancel each other.
 
@@ -93,86 +96,91 @@ class Chooser(Candidates):
         """
         if not omitted_effects:
             return True
-        if not (self.holds(self.solved(omitted_effects)) and self.holds(self.between(omitted_effects))):
+        if not (self.holds(self.changes_by_modes(omitted_effects)) and self.holds(self.between(omitted_effects))):
             return False
-        why = self._cancels(omitted_effects)
+        why = self._cancellation_text(omitted_effects)
         off = np.zeros(len(self.rows)) if why else self.off(omitted_effects)
         if not self.holds(off):
             why = f"changes {self.told(off)} with parameters 5 % off"
         if why:
-            self.refused[omitted_effects] = why
-        return not why and omitted_effects not in self.uncertified
+            self.refusal_reasons[omitted_effects] = why
+        return not why and omitted_effects not in self.uncertified_sets
 
-    def _cancels(self, omitted_effects: Set) -> str:
+    def _cancellation_text(self, omitted_effects: EffectSet) -> str:
         """Text on an effect whose removal alone, or return alone, breaks the tolerance that the whole choice keeps,
         since errors cancel; "" if there is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
-        alone = zip(self.effects, self.singles, strict=True)
+        alone = zip(self.effects, self.single_effect_sets, strict=True)
         parts = {f"{effect.name} alone changes": step for effect, step in alone if step < omitted_effects}
         parts |= {f"all but {effect.name} change": omitted_effects - {effect} for effect in omitted_effects}
         for said, part in parts.items():
-            changes = np.zeros(len(self.rows)) if not part or illegal(part) else self.between(part)
+            changes = np.zeros(len(self.rows)) if not part or refusal_reason(part) else self.between(part)
             if np.isfinite(changes).all() and not self.holds(changes):
                 return f"holds by errors that cancel: {said} {self.told(changes)}"
         return ""
 
-    @remembered
-    def _by_run(self, omitted_effects: Set) -> Cost:
+    @cached_in_object
+    def _cost_by_run(self, omitted_effects: EffectSet) -> Cost:
         """Cost as from ``accurate``, in a step that a run at the middle one of the screened speeds confirms."""
-        step, marches = self.accurate(omitted_effects).step, self.marches(omitted_effects)
-        while step and not confirms(marches[len(marches) // 2], step):
+        step, marches = self.cost_at_equal_accuracy(omitted_effects).step, self.marches(omitted_effects)
+        while step and not confirms_step(marches[len(marches) // 2], step):
             step *= STEP_FACTOR
         return self.at_step(omitted_effects, step)
 
     def choose(self) -> RideChoice:
         """The greedy choice, confirmed, without effects whose removal saves nothing at equal accuracy."""
-        chosen, rounds = self._certified()
+        chosen, rounds = self._certified_choice()
         unchanged, none = np.zeros(len(self.rows)), frozenset[Effect]()
-        looks = (self.confirm, self.between, self.off)
+        looks = (self.confirmed_changes, self.between, self.off)
         changes, between, off = (look(chosen) if chosen else unchanged for look in looks)
         return RideChoice(
             self.effects,
             tuple(effect for effect in self.effects if effect in chosen),
-            self.predicted(chosen),
+            self.predicted_changes(chosen),
             changes,
             between,
             off,
             all(map(self.holds, (changes, between, off))),
-            self._by_run(none),
-            self._by_run(chosen),
+            self._cost_by_run(none),
+            self._cost_by_run(chosen),
             (self.cost(none).step, self.cost(chosen).step),
             rounds,
-            self._reasons(chosen),
+            self._refusal_texts(chosen),
         )
 
-    def _certified(self) -> tuple[Set, int]:
+    def _certified_choice(self) -> tuple[EffectSet, int]:
         """The choice that saves calls and is certified, and the number of sets that were tested for it."""
         rounds = 0
-        while rounds < ROUNDS:
-            chosen, tested = self._greedy()
-            chosen, rounds = self._worthwhile(chosen), rounds + tested
-            saves = self.accurate(chosen).calls * (1 + EQUAL_COST_LOG) <= self.accurate(frozenset()).calls
+        while rounds < MOST_CONFIRMATIONS:
+            chosen, tested = self._greedy_set()
+            chosen, rounds = self._without_worthless_effects(chosen), rounds + tested
+            saves = (
+                self.cost_at_equal_accuracy(chosen).calls * (1 + EQUAL_COST_LOG)
+                <= self.cost_at_equal_accuracy(frozenset()).calls
+            )
             if not chosen or not saves:
                 break
             if self.certified(chosen):
                 return chosen, rounds
-            self.uncertified.add(chosen)
+            self.uncertified_sets.add(chosen)
         return frozenset(), rounds
 
-    def _reasons(self, omitted_effects: Set) -> tuple[str, ...]:
+    def _refusal_texts(self, omitted_effects: EffectSet) -> tuple[str, ...]:
         """Reasons why larger sets that kept the tolerance were refused."""
-        larger = {refused - omitted_effects: why for refused, why in self.refused.items() if refused - omitted_effects}
+        larger = {
+            refused - omitted_effects: why for refused, why in self.refusal_reasons.items() if refused - omitted_effects
+        }
         return tuple(
             f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
             for more, why in larger.items()
         )
 
-    def _greedy(self) -> tuple[Set, int]:
+    def _greedy_set(self) -> tuple[EffectSet, int]:
         """The set of effects to leave out, and the number of sets that were tested for it, also unsuccessfully."""
-        kept, banned, rounds = [frozenset[Effect]()], set[Set](), 0
-        while rounds < ROUNDS:
+        kept, banned, rounds = [frozenset[Effect]()], set[EffectSet](), 0
+        while rounds < MOST_CONFIRMATIONS:
             path = self.path(kept, banned)
             if path == kept:
                 break
@@ -189,49 +197,55 @@ class Chooser(Candidates):
             kept = path[: low + 1]
         return kept[-1], rounds
 
-    def _worthwhile(self, omitted_effects: Set) -> Set:
+    def _without_worthless_effects(self, omitted_effects: EffectSet) -> EffectSet:
         """The choice without effects whose return costs hardly any more calls at equal accuracy, or no shorter stable
         step. Fewer calls without a longer stable step only mean that errors of reduction and of steps cancel.
         """
-        fewer = [omitted_effects - {effect} for effect in omitted_effects if not illegal(omitted_effects - {effect})]
+        fewer = [
+            omitted_effects - {effect} for effect in omitted_effects if not refusal_reason(omitted_effects - {effect})
+        ]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
             if self._costs_the_same(less, omitted_effects) and self.within_tolerance(less):
-                return self._worthwhile(less)
+                return self._without_worthless_effects(less)
         return omitted_effects
 
-    def _costs_the_same(self, less: Set, omitted_effects: Set) -> bool:
+    def _costs_the_same(self, less: EffectSet, omitted_effects: EffectSet) -> bool:
         """Whether the smaller set ``less`` has no shorter stable step than the larger one, or about as few calls at
         equal accuracy.
         """
         stable = self.cost(less).step
         if stable >= self.cost(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return True
-        if stable < self.accurate(omitted_effects).step * (1 - EQUAL_COST_LOG):
+        if stable < self.cost_at_equal_accuracy(omitted_effects).step * (1 - EQUAL_COST_LOG):
             return False  # what is in the larger one alone bounds the step
-        return self.accurate(less).calls <= self.accurate(omitted_effects).calls * (1 + EQUAL_COST_LOG)
+        return self.cost_at_equal_accuracy(less).calls <= self.cost_at_equal_accuracy(omitted_effects).calls * (
+            1 + EQUAL_COST_LOG
+        )
 
-    def further(self, omitted_effects: Set) -> dict[Effect, float]:
+    def change_if_left_out_too(self, omitted_effects: EffectSet) -> dict[Effect, float]:
         """Largest confirmed change for each effect that stayed, if it were left out as well, with what it needs: with a
         larger tolerance than this, it could be. Only legal sets and finite changes.
         """
         changes = {
-            effect: float(abs(self.solved(omitted_effects | step)).max())
-            for effect, step in zip(self.effects, self.singles, strict=True)
-            if effect not in omitted_effects and not illegal(omitted_effects | step)
+            effect: float(abs(self.changes_by_modes(omitted_effects | step)).max())
+            for effect, step in zip(self.effects, self.single_effect_sets, strict=True)
+            if effect not in omitted_effects and not refusal_reason(omitted_effects | step)
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, start: list[Set], banned: set[Set]) -> list[Set]:
+    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
         """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
         path = list(start)
-        while step := self._best(path[-1], banned, self._calls_saved) or self._best(path[-1], banned, self._work_saved):
+        while step := self._best_step(path[-1], banned, self._calls_saved) or self._best_step(
+            path[-1], banned, self._work_saved
+        ):
             path.append(path[-1] | step)
         return path
 
-    def _calls_saved(self, omitted_effects: Set, further: Set) -> float:
+    def _calls_saved(self, omitted_effects: EffectSet, further: EffectSet) -> float:
         """Logarithm of the ratio by which leaving out more effects reduces the calls; 0 for ratios too small to spend
         tolerance on.
         """
@@ -239,26 +253,33 @@ class Chooser(Candidates):
         saved = log(self.cost(omitted_effects).calls / then) if then < inf else 0.0
         return saved if saved > EQUAL_COST_LOG else 0.0
 
-    def _work_saved(self, omitted_effects: Set, further: Set) -> float:
+    def _work_saved(self, omitted_effects: EffectSet, further: EffectSet) -> float:
         now, then = self.cost(omitted_effects), self.cost(further)
-        return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
+        return log(now.work / then.work) if then.calls <= now.calls * (1 + LARGEST_CALL_RISE) else 0.0
 
-    def _steps(self) -> list[Set]:
+    def _smallest_sets(self) -> list[EffectSet]:
         """The smallest sets that can be left out. A set that lets white noise pass is also tried together with the
         tyres' damping, through which this noise enters.
         """
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
-        white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
-        return self.singles + [step | damping for step in white]
+        white = [
+            step for step in self.single_effect_sets if damping and not np.isfinite(self.predicted_changes(step)).all()
+        ]
+        return self.single_effect_sets + [step | damping for step in white]
 
-    def _best(self, omitted_effects: Set, banned: set[Set], saved: Saved) -> Set:
+    def _best_step(self, omitted_effects: EffectSet, banned: set[EffectSet], saved: SavingOfStep) -> EffectSet:
         """The step that saves the most for what it adds to the predicted error; empty if no step keeps the
         tolerance.
         """
         best, most, now = frozenset[Effect](), 0.0, self.share(omitted_effects)
-        for step in self._steps():
+        for step in self._smallest_sets():
             further = omitted_effects | step
-            if further == omitted_effects or step - omitted_effects in banned or step in banned or illegal(further):
+            if (
+                further == omitted_effects
+                or step - omitted_effects in banned
+                or step in banned
+                or refusal_reason(further)
+            ):
                 continue
             saves = saved(omitted_effects, further)
             if saves <= NEGLIGIBLE_SHARE * most:

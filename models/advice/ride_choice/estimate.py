@@ -5,19 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.advice.ride_choice.candidates import SCREENED
+from models.advice.ride_choice.candidates import SCREENED_SPEEDS
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
-PROBLEMS = 4.0
-"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED`` speeds: in proportion
-fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and in size to the largest."""
-FURTHER = 0.05
+EIGENVALUE_PROBLEMS = 4.0
+"""Eigenvalue problems as long as a choice by each effect, each state and each of ``SCREENED_SPEEDS`` speeds: in
+proportion fitted to 14 scenes of 7 to 26 effects and 10 to 42 states, all within a factor of two, and in size to the
+largest.
+"""
+FURTHER_SPEED_SHARE = 0.05
 """What a further speed takes by one at which effects are screened: it is confirmed there, and nothing else."""
-SIZE, TIMES = 40, 9
+TIMED_PROBLEM_SIZE, TIMED_REPETITIONS = 40, 9
 """Size of the eigenvalue problem that is timed, and how many times."""
 
 
@@ -36,21 +38,25 @@ def estimate(ride: RideScene) -> Estimate:
     assert ride.speeds is not None
     with scene_errors(ride):
         scene = ReducedScene.complete(ride)
-        effects, speeds, states = len(effects_of(scene)), len(ride.speeds.all()), _states(scene, scene.excitation())
-    screened = min(speeds, SCREENED)
-    share = (1 + screened + FURTHER * (speeds - screened)) / (1 + SCREENED)
-    return Estimate(effects, speeds, states, PROBLEMS * effects * states * share * _eigenvalue_problem())
+        effects, speeds, states = (
+            len(effects_of(scene)),
+            len(ride.speeds.all()),
+            _count_of_states(scene, scene.excitation()),
+        )
+    screened = min(speeds, SCREENED_SPEEDS)
+    share = (1 + screened + FURTHER_SPEED_SHARE * (speeds - screened)) / (1 + SCREENED_SPEEDS)
+    return Estimate(effects, speeds, states, EIGENVALUE_PROBLEMS * effects * states * share * _eigenvalue_problem())
 
 
-def _states(scene: ReducedScene, road: Excitation) -> int:
+def _count_of_states(scene: ReducedScene, road: Excitation) -> int:
     """Number of states of the vehicle and of the road's filters."""
     return 2 * len(scene.vehicle.coordinates()) + len(road.heights) * len(road.F)
 
 
 def _eigenvalue_problem() -> float:
-    """Processor time (s) of an eigenvalue problem of ``SIZE`` states on this machine, now."""
-    A, seconds = np.random.default_rng(SIZE).standard_normal((SIZE, SIZE)), []
-    for _ in range(TIMES):
+    """Processor time (s) of an eigenvalue problem of ``TIMED_PROBLEM_SIZE`` states on this machine, now."""
+    A, seconds = np.random.default_rng(TIMED_PROBLEM_SIZE).standard_normal((TIMED_PROBLEM_SIZE, TIMED_PROBLEM_SIZE)), []
+    for _ in range(TIMED_REPETITIONS):
         begun = time.process_time()
         np.linalg.eig(A)
         seconds.append(time.process_time() - begun)

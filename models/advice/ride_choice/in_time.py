@@ -15,20 +15,20 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import absent_effects, with_effects
 from models.core.strict import LARGEST_QUANTITY, Strict, quantity
 from models.ride.gaussian_laws import of_curve, of_friction
-from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, forgotten, usual_step
+from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, settling_time, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import BentSpring, statistically_linear
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import in_time_only
 from models.systems.ride.omissions import effects_of, wheels_of
-from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
-from models.systems.ride.reduced_scene import without as without_effects
+from models.systems.ride.reduced_scene import Effect, ReducedScene, refusal_reason
+from models.systems.ride.reduced_scene import reduced_without as without_effects
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
 FEWEST_COPIES = 12
 """Copies of which a standard error can be told, its own error about a fifth."""
-UNIT = 48
+STEP_MULTIPLE = 48
 """Steps are whole numbers of so many, before and while outputs count: a step may be any divisor of it times as long."""
 ROADS_BYTES = 3e8
 """Bytes of roads that are kept, which many variants share, before one more."""
@@ -52,14 +52,14 @@ class CopySteps:
 
     speed: float
     half: float
-    settling: int
-    counted: int
+    settling_steps: int
+    counted_steps: int
     springs: dict[str, BentSpring]
 
     @property
     def steps(self) -> int:
         """Number of steps of a copy."""
-        return self.settling + self.counted
+        return self.settling_steps + self.counted_steps
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class CopiesInTime:
 
     scene: ReducedScene
     samples: Samples
-    paces: tuple[CopySteps, ...]
+    steps_at_speeds: tuple[CopySteps, ...]
     effects: tuple[Effect, ...]
     left_out: frozenset[str] = frozenset()
     times: int = 1
@@ -103,23 +103,23 @@ class CopiesInTime:
     @property
     def steps(self) -> int:
         """Number of steps of all copies at all speeds."""
-        return self.samples.copies * sum(pace.steps for pace in self.paces) // self.times
+        return self.samples.copies * sum(pace.steps for pace in self.steps_at_speeds) // self.times
 
     def without(self, names: Iterable[str]) -> "CopiesInTime":
         """The scene without these effects; InputError where they may not be left out."""
         left_out = self.left_out | set(names)
         chosen = [effect for effect in self.effects if effect.name in left_out]
-        why = illegal(chosen)
+        why = refusal_reason(chosen)
         if why:
             raise InputError(self.file, "effects", None, why)
         fresh = [effect for effect in chosen if effect.name not in self.left_out]
         return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
-    def longer(self, times: int) -> "CopiesInTime":
+    def in_longer_steps(self, times: int) -> "CopiesInTime":
         """The scene in steps ``times`` as long as now."""
         return replace(self, times=self.times * times)
 
-    def fewer(self, steps: int) -> "CopiesInTime":
+    def with_fewer_copies(self, steps: int) -> "CopiesInTime":
         """The scene with so few copies that these take about ``steps`` steps in all, but enough copies for a standard
         error.
         """
@@ -138,16 +138,16 @@ class CopiesInTime:
 
     def roads(self, pace: CopySteps) -> np.ndarray:
         """Heights and rates (2 steps + 1, 2 w, copies) of the road at half steps."""
-        roads = _roads(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
+        roads = _road_heights(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
         return np.ascontiguousarray(roads[:: self.times])
 
-    def squares(self, pace: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+    def mean_squares(self, pace: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
         """Outputs of the vehicle, and for each copy the mean squares (copies, p) about the mean of all copies."""
         step = 2.0 * pace.half * self.times
         march = CopiesMarch(self.vehicle(pace), pace.speed, step, self.samples.copies)
         every = max(1, STEPS_PER_READING // self.times)
-        march.over(roads, pace.settling // self.times, every)
-        count = len(range(0, pace.counted // self.times, every))
+        march.march_over(roads, pace.settling_steps // self.times, every)
+        count = len(range(0, pace.counted_steps // self.times, every))
         first, second = march.sums[0].T / count, march.sums[1].T / count
         if not (second < LARGEST_QUANTITY).all():
             raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
@@ -163,8 +163,10 @@ def in_time(scene: ReducedScene) -> CopiesInTime:
     speeds, options = scene.ride.speeds, scene.ride.options
     assert speeds is not None
     samples = Samples.model_validate({key: value for key, value in options.items() if key in Samples.model_fields})
-    paces = tuple(_pace(scene, float(speed), samples.lasting) for speed in speeds.all())
-    return CopiesInTime(scene, samples, paces, tuple(effect for effect in effects_of(scene) if _may_go(scene, effect)))
+    paces = tuple(_copy_steps(scene, float(speed), samples.lasting) for speed in speeds.all())
+    return CopiesInTime(
+        scene, samples, paces, tuple(effect for effect in effects_of(scene) if _can_be_left_out(scene, effect))
+    )
 
 
 def _check(scene: ReducedScene) -> None:
@@ -178,16 +180,16 @@ def _check(scene: ReducedScene) -> None:
     check_rates(scene.vehicle, scene.excitation(), ride.file)
 
 
-def _pace(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
+def _copy_steps(scene: ReducedScene, speed: float, lasting: float) -> CopySteps:
     excitation = scene.excitation()
     linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
     half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half
-    unit = 2.0 * half * UNIT
-    settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(linear.vehicle), lasting))
+    unit = 2.0 * half * STEP_MULTIPLE
+    settling, counted = (STEP_MULTIPLE * int(np.ceil(time / unit)) for time in (settling_time(linear.vehicle), lasting))
     return CopySteps(speed, half, settling, counted, linear.springs)
 
 
-def _may_go(scene: ReducedScene, effect: Effect) -> bool:
+def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
     """Whether a run in time can do without an effect and the parts that leave with it."""
     rest = effect.without(scene)
     rigid = (spring for spring in scene.vehicle.springs if spring.name in rest.rigid)
@@ -212,12 +214,12 @@ def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> Spati
 
     return replace(
         scene.vehicle,
-        springs=tuple(_straight(s, scene.straight, moving) for s in springs if s.name not in scene.rigid),
+        springs=tuple(_linearised_spring(s, scene.straight, moving) for s in springs if s.name not in scene.rigid),
         bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda each: each.name in seats)),
     )
 
 
-def _straight(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
+def _linearised_spring(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
     """The spring with gains of statistical linearisation in place of these laws."""
     motion = moving.get(spring.name)
     if motion is None:
@@ -234,17 +236,17 @@ def _straight(spring: SpringDamper, laws: frozenset[str], moving: dict[str, Bent
     return spring
 
 
-_kept: dict[tuple[object, ...], np.ndarray] = {}
+_kept_roads: dict[tuple[object, ...], np.ndarray] = {}
 
 
-def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
+def _road_heights(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     """Heights and rates (2 steps + 1, 2 w, copies) of the road; those that were requested last are kept."""
     road = path.excitation
     arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
     of_run = path.speed, path.half, steps, samples.copies, samples.seed
     key = (*arrays, road.lengths, road.independent, *of_run)
-    if key not in _kept:
-        while sum(roads.nbytes for roads in _kept.values()) > ROADS_BYTES:
-            del _kept[next(iter(_kept))]
-        _kept[key] = next(path.blocks(steps, samples.copies, samples.seed))
-    return _kept[key]
+    if key not in _kept_roads:
+        while sum(roads.nbytes for roads in _kept_roads.values()) > ROADS_BYTES:
+            del _kept_roads[next(iter(_kept_roads))]
+        _kept_roads[key] = next(path.blocks(steps, samples.copies, samples.seed))
+    return _kept_roads[key]

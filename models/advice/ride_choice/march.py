@@ -19,16 +19,16 @@ from typing import Protocol
 import numpy as np
 
 from models.advice.ride_choice.reduced import Reduced, ReducedVehicle
-from models.advice.ride_choice.waves import Filters, frequencies, together, weighting_factors
-from models.core.runge_kutta import STAGES
+from models.advice.ride_choice.waves import Filters, frequency_panels, pair_factors, weighting_factors
+from models.core.runge_kutta import RK4_STAGES
 from models.road.excitation import Excitation
 
-ALIKE, BEYOND = 6, 6.0
+LEAST_ALIASES, ALIAS_RANGE_FACTOR = 6, 6.0
 """Waves to either side that look alike at the steps, at least, and so many times the road's last corner; the last two
 stand for all beyond, which fall with their square."""
-LOWEST = 1e-4
+LOWEST_FREQUENCY_SHARE = 1e-4
 """Where panels of frequencies begin, by the highest frequency that steps can tell."""
-SHORTEST_STEP_SHARE, STEPS, FINE = 1 / 32, 8, 64
+SHORTEST_STEP_SHARE, STEPS_TRIED, PARTS_BETWEEN_STEPS = 1 / 32, 8, 64
 """Shortest step that is tried, by the longest stable one; steps from there on, and parts of what lies between two."""
 NEGLIGIBLE_SHARE = 1e-12
 """An error, by the tolerance, that is none."""
@@ -72,22 +72,22 @@ class March:
         return self.reduced.system.C[plain, : self.reduced.states]
 
     @cached_property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest step (s) at which the vehicle's march is stable."""
         return self.reduced.of_vehicle.stable_step
 
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities that a run in steps of ``step`` (s) samples."""
         omega, weights, apart = self._frequencies(step)
-        last, half = self._alike(step), np.exp(0.5j * step * omega)
+        last, half = self._count_of_aliases(step), np.exp(0.5j * step * omega)
         alike = np.arange(-last, last + 1)[:, None]
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = np.zeros((len(omega), len(self.rows)))
         for odd, gains in enumerate(self._gains(half, step)):
             these = alike[:, 0] % 2 == odd
             waves = omega + 2 * np.pi * alike[these] / step
-            total += self._met(gains, waves, count[these], apart)
-        return np.sqrt(weights @ (total * abs(self._heard(omega).T) ** 2) / np.pi)
+            total += self._spectral_densities(gains, waves, count[these], apart)
+        return np.sqrt(weights @ (total * abs(self._weighting_factors(omega).T) ** 2) / np.pi)
 
     def _gains(self, half: np.ndarray, step: float) -> Iterator[list[np.ndarray]]:
         """Gains (w, q, m) from the states of each axle's filter to the quantities, for waves whose phase turns by
@@ -123,7 +123,9 @@ class March:
         slope = (at**2 - 1) / step * np.eye(len(road.F)) - self.speed * road.F * ((1 + 4 * at + at**2) / 6)
         return np.asarray(np.linalg.pinv(self.speed**0.5 * road.G) @ slope)
 
-    def _met(self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    def _spectral_densities(
+        self, gains: list[np.ndarray], waves: np.ndarray, count: np.ndarray, apart: np.ndarray
+    ) -> np.ndarray:
         """Spectral densities (w, q) of the quantities, summed over all ``waves`` (a, w) that look alike, each weighted
         with its ``count`` (a, 1).
         """
@@ -131,7 +133,7 @@ class March:
         late, by_noises = {}, self.filters.by_noises(gains)
         for pair in self.filters.pairs:
             density = count * pair.density(speeds, waves.ravel()).reshape(waves.shape)
-            own, shared = together(by_noises, pair, road.independent)
+            own, shared = pair_factors(by_noises, pair, road.independent)
             total = total + (density.sum(axis=0)[:, None] * own).real
             for (i, j), met in shared.items():
                 length = road.lengths[i] - road.lengths[j]
@@ -145,20 +147,20 @@ class March:
         """Filters of an axle of the road."""
         return Filters(self.reduced.excitation)
 
-    def _alike(self, step: float) -> int:
+    def _count_of_aliases(self, step: float) -> int:
         """Number of aliased waves to either side within which contributions need not fall with the square of the
         distance.
         """
         corner = self.speed * abs(np.linalg.eigvals(self.reduced.excitation.F)).max()
-        return max(ALIKE, int(np.ceil(BEYOND * corner * step / (2 * np.pi))))
+        return max(LEAST_ALIASES, int(np.ceil(ALIAS_RANGE_FACTOR * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
         """Frequencies up to the one with two steps per period, with their weights."""
         highest = np.pi / step
         delay = max(self.reduced.excitation.lengths) / self.speed
-        return frequencies(self.motions[0], delay, (LOWEST * highest, highest))
+        return frequency_panels(self.motions[0], delay, (LOWEST_FREQUENCY_SHARE * highest, highest))
 
-    def _heard(self, omega: np.ndarray) -> np.ndarray:
+    def _weighting_factors(self, omega: np.ndarray) -> np.ndarray:
         """Factors (q, w) of the weightings at angular frequencies ``omega``."""
         names = dict(self.weightings)
         return weighting_factors([names.get(row, "") for row in self.rows], omega)
@@ -168,7 +170,7 @@ class RunInSteps(Protocol):
     """Runs in time of a scene at one speed, in steps (s) of any length."""
 
     @property
-    def longest(self) -> float:
+    def longest_stable_step(self) -> float:
         """Longest step (s) at which the run is stable."""
 
     def deviations(self, step: float) -> np.ndarray:
@@ -195,32 +197,35 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
             worst = max(worst, float(np.log(max(error, NEGLIGIBLE_SHARE))))
         return worst
 
-    high = 0.999 * min(march.longest for march in marches)
-    steps = np.geomspace(SHORTEST_STEP_SHARE * high / 0.999, high, STEPS)
-    shares, low, broken = dict[int, float](), -1, STEPS
+    high = 0.999 * min(march.longest_stable_step for march in marches)
+    steps = np.geomspace(SHORTEST_STEP_SHARE * high / 0.999, high, STEPS_TRIED)
+    shares, low, broken = dict[int, float](), -1, STEPS_TRIED
     while broken - low > 1:
         middle = (low + broken) // 2
         shares[middle] = share(steps[middle])
         low, broken = (middle, broken) if shares[middle] <= 0.0 else (low, middle)
-    if low < 0 or broken == STEPS:
+    if low < 0 or broken == STEPS_TRIED:
         return float(steps[low]) if low >= 0 else 0.0
-    return _between((steps[low], steps[broken]), (shares[low], shares[broken]), share)
+    return _longest_step_below((steps[low], steps[broken]), (shares[low], shares[broken]), share)
 
 
-def _between(steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]) -> float:
-    """Longest of ``FINE`` logarithmically spaced steps (s) below the first one that breaks the tolerance.
+def _longest_step_below(
+    steps: tuple[float, float], shares: tuple[float, float], share: Callable[[float], float]
+) -> float:
+    """Longest of ``PARTS_BETWEEN_STEPS`` logarithmically spaced steps (s) below the first one that breaks the
+    tolerance.
 
     An error grows as a power of the step, so that linear interpolation of logarithms predicts where to look next.
     """
-    (low, high), (below, above) = (0, FINE), shares
+    (low, high), (below, above) = (0, PARTS_BETWEEN_STEPS), shares
     while high - low > 1:
         guess = low + (high - low) * -below / (above - below) if np.isfinite(above) else (low + high) / 2
         middle = int(np.clip(np.round(guess), low + 1, high - 1))
-        value = share(steps[0] * (steps[1] / steps[0]) ** (middle / FINE))
+        value = share(steps[0] * (steps[1] / steps[0]) ** (middle / PARTS_BETWEEN_STEPS))
         (low, below), (high, above) = (
             ((middle, value), (high, above)) if value <= 0.0 else ((low, below), (middle, value))
         )
-    return float(steps[0] * (steps[1] / steps[0]) ** (low / FINE))
+    return float(steps[0] * (steps[1] / steps[0]) ** (low / PARTS_BETWEEN_STEPS))
 
 
 @dataclass(frozen=True)
@@ -246,4 +251,4 @@ class Cost:
 def cost(vehicle: ReducedVehicle, excitation: Excitation) -> Cost:
     """Cost of a run of a stable vehicle on its road; infinite for an unstable vehicle, which has no stable step."""
     states, step = len(vehicle.states.A) + len(excitation.heights) * len(excitation.F), vehicle.stable_step
-    return Cost(states, step, STAGES / step if step else np.inf)
+    return Cost(states, step, RK4_STAGES / step if step else np.inf)

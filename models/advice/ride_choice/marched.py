@@ -10,17 +10,17 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from models.advice.ride_choice.march import March
-from models.core.runge_kutta import STAGES, step_on
+from models.core.runge_kutta import RK4_STAGES, step_on
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
-REFINEMENT = 4
+STEP_REFINEMENT = 4
 """Steps of the run beside it are so many times as short."""
-COPIES, LONGEST_RUN_SECONDS, LONGEST_RUN_STEPS = 48, 20.0, 1500
+NUMBER_OF_COPIES, LONGEST_RUN_SECONDS, LONGEST_RUN_STEPS = 48, 20.0, 1500
 """Copies; each runs for so many seconds (s), or for so many steps if that is shorter."""
-BLOCK = 250
+STEPS_PER_BLOCK = 250
 """Steps whose states are kept before they are summed."""
-BEGIN = 0.2
+SETTLING_SHARE = 0.2
 """Share of a run in which it forgets its beginning, and nothing counts."""
 SEED = 1
 ALLOWED_SHARE = 0.1
@@ -33,43 +33,43 @@ ALLOWED_STANDARD_ERRORS = 4.0
 
 @dataclass(frozen=True)
 class Marched:
-    """Comparison of a run with one in shorter steps. ratio (q,) : of standard deviations; error (q,) : standard error
-    of the ratio; calls : per second of motion.
+    """Comparison of a run with one in shorter steps. deviation_ratio (q,) : of standard deviations; error (q,) :
+    standard error of the ratio; calls : per second of motion.
     """
 
-    ratio: np.ndarray
+    deviation_ratio: np.ndarray
     error: np.ndarray
     calls: float
 
 
-def marched(march: March, step: float, copies: int = COPIES) -> Marched:
+def comparison_of_steps(march: March, step: float, copies: int = NUMBER_OF_COPIES) -> Marched:
     """Run a scene in steps of ``step`` (s) and in shorter ones."""
     steps = max(int(min(LONGEST_RUN_SECONDS / step, LONGEST_RUN_STEPS)), 10)
-    road = _states(march, step / REFINEMENT, steps * REFINEMENT, copies)
-    coarse, calls = _squares(march, road[::REFINEMENT], step)
-    fine, _ = _squares(march, road, step / REFINEMENT)
+    road = _filter_states(march, step / STEP_REFINEMENT, steps * STEP_REFINEMENT, copies)
+    coarse, calls = _mean_squares(march, road[::STEP_REFINEMENT], step)
+    fine, _ = _mean_squares(march, road, step / STEP_REFINEMENT)
     mean = fine.mean(axis=0)
     squared = coarse.mean(axis=0) / mean
     error = (coarse - squared * fine).std(axis=0, ddof=1) / (np.sqrt(copies) * mean * 2 * np.sqrt(squared))
     return Marched(np.sqrt(squared), error, calls / (steps * step))
 
 
-def confirms(march: March, step: float) -> bool:
+def confirms_step(march: March, step: float) -> bool:
     """Whether a run in steps of ``step`` (s) changes standard deviations, before weightings, as much as the closed form
     predicts.
     """
     plain = replace(march, weightings=())
-    run = marched(plain, step)
-    said = plain.deviations(step) / plain.deviations(step / REFINEMENT)
+    run = comparison_of_steps(plain, step)
+    said = plain.deviations(step) / plain.deviations(step / STEP_REFINEMENT)
     return bool(
         (
-            abs(run.ratio - said)
+            abs(run.deviation_ratio - said)
             <= ALLOWED_STANDARD_ERRORS * run.error + ALLOWED_SHARE * abs(said - 1.0) + CLOSED_FORM_ERROR
         ).all()
     )
 
 
-def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
+def _filter_states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
     """States (2 steps + 1, a m, copies) of the road filters of all axles at half steps."""
     road = march.reduced.excitation
     axles, m = len(road.heights), len(road.F)
@@ -78,30 +78,34 @@ def _states(march: March, step: float, steps: int, copies: int) -> np.ndarray:
     return next(path.blocks(steps, copies, SEED))[:, : axles * m]
 
 
-def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
+def _mean_squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, int]:
     """Mean squares (copies, q) of quantities in a run over a road that is given at half steps, and the number of calls
     of the right-hand side.
 
     A step of a linear system is a matrix; it is found by a step from the unit matrix.
     """
     n, steps, (_, m, copies) = march.vehicle, len(road) // 2, road.shape
-    move, *weights = _step(march.reduced.system.A[:n, :n], step)
+    move, *weights = _step_matrices(march.reduced.system.A[:n, :n], step)
     by_road = [weight @ march.reduced.system.A[:n, n : n + m] for weight in weights]
-    x, first, sums = _begin(march, road[0]), int(np.ceil(BEGIN * steps)), np.zeros((len(march.rows), copies))
-    for begin in range(0, steps, BLOCK):
-        here = road[2 * begin : 2 * min(begin + BLOCK, steps) + 1]
+    x, first, sums = (
+        _initial_states(march, road[0]),
+        int(np.ceil(SETTLING_SHARE * steps)),
+        np.zeros((len(march.rows), copies)),
+    )
+    for begin in range(0, steps, STEPS_PER_BLOCK):
+        here = road[2 * begin : 2 * min(begin + STEPS_PER_BLOCK, steps) + 1]
         moved = by_road[0] @ here[:-2:2] + by_road[1] @ here[1::2] + by_road[2] @ here[2::2]
-        moved += sum(weights) @ _noise(march, here, step)
+        moved += sum(weights) @ _mean_noise_force(march, here, step)
         for i in range(len(moved)):
             moved[i] += move @ x
             x = moved[i]
         counted = slice(max(first - begin, 0), None)
         heard = march.read[:, :n] @ moved[counted] + march.read[:, n:] @ here[2::2][counted]
         sums += (heard**2).sum(axis=0)
-    return (sums / (steps - first)).T, STAGES * steps
+    return (sums / (steps - first)).T, RK4_STAGES * steps
 
 
-def _step(A: np.ndarray, step: float) -> list[np.ndarray]:
+def _step_matrices(A: np.ndarray, step: float) -> list[np.ndarray]:
     """Matrices (n, n) of one step (s): how the new state depends on the old one, and on forces at the step's begin,
     middle and end.
     """
@@ -111,7 +115,7 @@ def _step(A: np.ndarray, step: float) -> list[np.ndarray]:
     return np.split(step_on(lambda time, x: A @ x + acting[time], 0.0, columns, step), 4, axis=1)
 
 
-def _begin(march: March, road: np.ndarray) -> np.ndarray:
+def _initial_states(march: March, road: np.ndarray) -> np.ndarray:
     """Initial states (n, copies) of the vehicle, drawn from its stationary ride for given states (m, copies) of the
     road.
 
@@ -125,7 +129,7 @@ def _begin(march: March, road: np.ndarray) -> np.ndarray:
     return told @ road + vectors * np.sqrt(values.clip(0.0)) @ chance
 
 
-def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
+def _mean_noise_force(march: March, road: np.ndarray, step: float) -> np.ndarray:
     """Mean force (steps, n, copies) that white noise exerts over each step, 0 where no noise reaches the vehicle."""
     roads, n = march.reduced.excitation, march.vehicle
     into = np.hstack([b[:n] for b in march.reduced.system.B])

@@ -13,10 +13,10 @@ from scipy.linalg.lapack import dgebal
 
 from models.ride.weighting import WEIGHTINGS
 
-PARALLEL = 1e6
+LARGEST_MODE_CONDITION = 1e6
 """Product of the sizes of a column of V and a row of W, by which rounding grows, beyond which motions are too much
 alike to tell."""
-INVERSE = 1e-9
+INVERSE_TOLERANCE = 1e-9
 """By how much W V may differ from the unit matrix."""
 
 STEP_TIMES_EIGENVALUE = np.linspace(0.0, 3.0, 601)[1:]
@@ -43,9 +43,9 @@ class Modes:
         V, W = self.V / scale[:, None], self.W * scale
         off = abs(W @ V - np.eye(len(A))).max(initial=0.0)
         grows = (np.linalg.norm(V, axis=0) * np.linalg.norm(W, axis=1)).max(initial=0.0)
-        return self if off <= INVERSE and grows <= PARALLEL else None
+        return self if off <= INVERSE_TOLERANCE and grows <= LARGEST_MODE_CONDITION else None
 
-    def moved(self, time: float, B: np.ndarray) -> np.ndarray:
+    def propagated(self, time: float, B: np.ndarray) -> np.ndarray:
         """The product e^(A t) B (n, k) after a time t (s)."""
         return np.asarray(((self.V * np.exp(self.rates * time)) @ (self.W @ B)).real)
 
@@ -86,10 +86,14 @@ def driven_motions(driver: Modes | None, coupling: np.ndarray, system: Modes | N
         return None
     met = (system.W @ coupling @ driver.V) / apart
     rates = np.concatenate([driver.rates, system.rates])
-    return Modes(rates, _below(driver.V, system.V @ met, system.V), _below(driver.W, -met @ driver.W, system.W))
+    return Modes(
+        rates,
+        _block_triangular(driver.V, system.V @ met, system.V),
+        _block_triangular(driver.W, -met @ driver.W, system.W),
+    )
 
 
-def _below(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarray:
+def _block_triangular(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarray:
     """Block matrix [[upper, 0], [corner, lower]]."""
     n = len(upper)
     whole = np.zeros((n + len(lower),) * 2, complex)
@@ -99,7 +103,7 @@ def _below(upper: np.ndarray, corner: np.ndarray, lower: np.ndarray) -> np.ndarr
 
 def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int) -> Modes | None:
     """Modes of a vehicle together with its axles' road filters F (m, m), for the state (x, f) and its matrix A."""
-    n, road = len(A) - axles * len(F), _filters(F.tobytes(), len(F), axles)
+    n, road = len(A) - axles * len(F), _modes_of_filters(F.tobytes(), len(F), axles)
     if road is None or vehicle is None:
         return None
     both = driven_motions(road, A[:n, n:], vehicle)
@@ -111,7 +115,7 @@ def behind_road(A: np.ndarray, vehicle: Modes | None, F: np.ndarray, axles: int)
 
 def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...]) -> Modes | None:
     """Modes of a system together with the weighting filters of its outputs, for the state (x, w) and its matrix A."""
-    filters = _weightings(names)
+    filters = _modes_of_weightings(names)
     if system is None or filters is None:
         return None
     n = len(system.rates)
@@ -120,7 +124,7 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
 
 
 @lru_cache(maxsize=256)
-def _filters(F: bytes, size: int, axles: int) -> Modes | None:
+def _modes_of_filters(F: bytes, size: int, axles: int) -> Modes | None:
     each = modes_of(np.frombuffer(F).reshape(size, size))
     if each is None:
         return None
@@ -128,7 +132,7 @@ def _filters(F: bytes, size: int, axles: int) -> Modes | None:
 
 
 @lru_cache(maxsize=64)
-def _weightings(names: tuple[str, ...]) -> Modes | None:
+def _modes_of_weightings(names: tuple[str, ...]) -> Modes | None:
     parts = [modes_of(WEIGHTINGS[name].matrices()[0]) for name in names]
     filters = [part for part in parts if part]
     if len(filters) < len(parts):

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigvals
 
-from models.advice.ride_choice.parameters import PARAMETER_ERROR, Parameter, parameters, scaled_vehicle
+from models.advice.ride_choice.parameters import PARAMETER_ERROR, Parameter, scaled_vehicle, uncertain_parameters
 from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, of_speed
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.slopes import Sensitivity, Shifts
-from models.advice.ride_choice.waves import at_axles, filtered, frequencies, variances, weighting_factors
+from models.advice.ride_choice.waves import at_axles, filter_states, frequency_panels, variances, weighting_factors
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
-LOBES, EVEN = 12.0, 10
+LOBE_FREQUENCY, LEAST_SPEEDS = 12.0, 10
 """Speeds so close that waves of this frequency (Hz) turn by an eighth between axles, and at least so many."""
 SLOPE_SPEEDS = 9
 """Speeds at which slopes are told."""
@@ -40,9 +40,9 @@ def speeds_between(scene: ReducedScene, listed: np.ndarray) -> np.ndarray:
     if low == high:
         return np.array([low])
     length = max(scene.excitation().lengths)
-    turns = 8.0 * LOBES * length * (1.0 / low - 1.0 / high)
+    turns = 8.0 * LOBE_FREQUENCY * length * (1.0 / low - 1.0 / high)
     slow = 1.0 / np.linspace(1.0 / high, 1.0 / low, int(np.ceil(turns)) + 1)
-    return np.unique(np.concatenate([listed, slow, np.geomspace(low, high, EVEN)]).round(12))
+    return np.unique(np.concatenate([listed, slow, np.geomspace(low, high, LEAST_SPEEDS)]).round(12))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Neighbourhood:
         self.speeds = speeds_between(scene, listed)
         self.vehicles = Vehicles(scene.vehicle, float(self.speeds[0])) if vehicles is None else vehicles
         self.off = 0
-        self.parameters = parameters(scene.vehicle)
+        self.parameters = uncertain_parameters(scene.vehicle)
         self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, SLOPE_SPEEDS).round().astype(int))]
         self._shifts: dict[Hashable, Shifts] = {}
         self.whole, self.at_few = self._variances(scene, self.vehicles), self._slopes(scene)
@@ -101,22 +101,25 @@ class Neighbourhood:
         logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
         worst = (abs(ratio - 1) + abs(slopes).sum(axis=2)).argmax(axis=0)
-        signs = [_signs(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
+        signs = [_signs_of_slopes(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
         return [dict(zip(self.parameters, 1.0 + PARAMETER_ERROR * sign, strict=True)) for sign in signs]
 
     def _variances(self, scene: ReducedScene, vehicles: Vehicles) -> np.ndarray:
         """Variances (v, q) of a scene at all speeds."""
-        groups = _alike(scene.vehicle, self.speeds)
-        return np.concatenate([self._sum(scene, vehicles, speeds).variances for speeds in groups])
+        groups = _speeds_with_same_matrices(scene.vehicle, self.speeds)
+        return np.concatenate([self._frequency_sum(scene, vehicles, speeds).variances for speeds in groups])
 
-    def _sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "Sum":
-        return Sum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
+    def _frequency_sum(self, scene: ReducedScene, vehicles: Vehicles, speeds: np.ndarray) -> "FrequencySum":
+        return FrequencySum(vehicles.roads.of(scene), vehicles.of(scene, float(speeds[0])), self.quantities, speeds)
 
     def _slopes(self, scene: ReducedScene) -> Spectra:
         """Variances of a scene at a few speeds, with their first-order changes by each parameter that is off."""
         variances, slopes = [], []
-        for speeds in _alike(scene.vehicle, self.few):
-            total, vehicle = self._sum(scene, self.vehicles, speeds), self.vehicles.of(scene, float(speeds[0]))
+        for speeds in _speeds_with_same_matrices(scene.vehicle, self.few):
+            total, vehicle = (
+                self._frequency_sum(scene, self.vehicles, speeds),
+                self.vehicles.of(scene, float(speeds[0])),
+            )
             sensitivity = Sensitivity(total.response, total.heights(), total.weights, vehicle.N)
             inert = [group != "bodies" or name not in scene.massless for group, name, _ in self.parameters]
             variances.append(total.variances)
@@ -129,11 +132,11 @@ class Neighbourhood:
         """
         whole = self.scene.vehicle
         if not whole.gravity and replace(vehicle, bars=whole.bars, tyres=whole.tyres) == whole:
-            there = set(parameters(vehicle))
-            return self._made(whole, speed).only(np.array([each in there for each in self.parameters]))
-        return self._made(vehicle, speed)
+            there = set(uncertain_parameters(vehicle))
+            return self._parameter_shifts(whole, speed).only(np.array([each in there for each in self.parameters]))
+        return self._parameter_shifts(vehicle, speed)
 
-    def _made(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
+    def _parameter_shifts(self, vehicle: SpatialVehicle, speed: float) -> Shifts:
         key = vehicle, of_speed(vehicle, speed)
         if key not in self._shifts:
             linear, factor = self.vehicles.linear, 1.0 + PARAMETER_ERROR
@@ -142,16 +145,16 @@ class Neighbourhood:
         return self._shifts[key]
 
 
-class Sum:
+class FrequencySum:
     """Sums over frequencies (w,) for a reduced scene at speeds (m/s)."""
 
     def __init__(
         self, excitation: Excitation, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
     ) -> None:
         self.excitation, self.speeds = excitation, speeds
-        rates = vehicle.modes.rates if vehicle.modes else _rates(vehicle.linear)
+        rates = vehicle.modes.rates if vehicle.modes else _vehicle_eigenvalues(vehicle.linear)
         ends = FREQUENCY_ENDS[0] * abs(rates).min(), FREQUENCY_ENDS[1] * abs(rates).max()
-        self.omega, weights, self.apart = frequencies(rates, max(self.excitation.lengths) / float(speeds[0]), ends)
+        self.omega, weights, self.apart = frequency_panels(rates, max(self.excitation.lengths) / float(speeds[0]), ends)
         factors = weighting_factors([name for _, name in quantities], self.omega).T
         self.weights = weights[:, None] * abs(factors) ** 2 / np.pi
         self.response = Response(vehicle, [row for row, _ in quantities], self.omega)
@@ -166,22 +169,22 @@ class Sum:
 
     def heights(self) -> np.ndarray:
         """Transfer functions (v, w, wheels, k) from unit noises to heights under the wheels."""
-        each = filtered(self.excitation, self.speeds, self.omega)
+        each = filter_states(self.excitation, self.speeds, self.omega)
         road = at_axles(each, self.excitation, self.speeds, self.omega, self.apart)
         return np.asarray(np.hstack(self.excitation.heights) @ road)
 
 
-def _signs(slopes: np.ndarray) -> np.ndarray:
+def _signs_of_slopes(slopes: np.ndarray) -> np.ndarray:
     """Signs of slopes (p,): 1 or -1; 1 also for slopes that vanish, whose sign would come from rounding."""
     return np.where(slopes < -ROUNDING_SHARE * abs(slopes).max(initial=0.0), -1.0, 1.0)
 
 
-def _alike(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:
+def _speeds_with_same_matrices(vehicle: SpatialVehicle, speeds: np.ndarray) -> list[np.ndarray]:
     """Groups of speeds (m/s) at which the vehicle has the same matrices."""
     return [speeds] if of_speed(vehicle, 0.0) is None else [speeds[[i]] for i in range(len(speeds))]
 
 
-def _rates(vehicle: LinearVehicle) -> np.ndarray:
+def _vehicle_eigenvalues(vehicle: LinearVehicle) -> np.ndarray:
     """Eigenvalues (1/s) of a vehicle; with massless bodies there are fewer."""
     n = len(vehicle.mass)
     left = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), vehicle.mass]])

@@ -22,7 +22,7 @@ Parameter = tuple[str, str, str]
 """Group, name and key of a value, as in ("springs", "front left", "damping")."""
 
 
-def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
+def uncertain_parameters(vehicle: SpatialVehicle) -> list[Parameter]:
     """All parameters of a vehicle that may be off: those with a value other than 0."""
     return [
         (group, part.name, key)
@@ -38,7 +38,9 @@ def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) 
 
     def part(group: str, original_part: Any) -> Any:
         known = [key for key in PARAMETERS_OF_PARTS[group] if (group, original_part.name, key) in factors]
-        after = {key: _times(getattr(original_part, key), factors[group, original_part.name, key]) for key in known}
+        after = {
+            key: _multiplied(getattr(original_part, key), factors[group, original_part.name, key]) for key in known
+        }
         return replace(original_part, **after) if after else original_part
 
     groups: dict[str, Any] = {
@@ -47,5 +49,5 @@ def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) 
     return replace(vehicle, **groups)
 
 
-def _times(value: Any, factor: float) -> Any:
-    return tuple(_times(each, factor) for each in value) if isinstance(value, tuple) else value * factor
+def _multiplied(value: Any, factor: float) -> Any:
+    return tuple(_multiplied(each, factor) for each in value) if isinstance(value, tuple) else value * factor

@@ -18,7 +18,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import tables_of
 from models.ride.covariance import noise_of
 from models.ride.excited import DelayedSystem, VehicleStates, first_order, vehicle_states
-from models.ride.weighting import weighted
+from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -29,14 +29,14 @@ from models.vehicles.spatial_linear import free, limited, linearise, massless
 @dataclass(frozen=True)
 class ReducedVehicle:
     """A vehicle without some of its effects. linear : M, D, K in the remaining coordinates (M may be singular); N (n,
-    r) : from these to the full vehicle's; states : of first order; behind (r, n) : from the full coordinates back,
-    keeping momentum.
+    r) : from these to the full vehicle's; states : of first order; residual_flexibility (r, n) : from the full
+    coordinates back, keeping momentum.
     """
 
     linear: LinearVehicle
     N: np.ndarray
     states: VehicleStates
-    behind: np.ndarray
+    residual_flexibility: np.ndarray
 
     @cached_property
     def modes(self) -> Modes | None:
@@ -79,7 +79,7 @@ class Reduced:
     @cached_property
     def noise(self) -> np.ndarray:
         """Covariance (x, x) per second that the noise of all axles adds."""
-        return noise_of(self.system, self.modes.moved if self.modes else None)
+        return noise_of(self.system, self.modes.propagated if self.modes else None)
 
 
 class Numbers:
@@ -101,10 +101,10 @@ class Numbers:
     def of_parts(self, thing: Any, *names: str) -> tuple[int, ...]:
         """Numbers of an object's attributes; copies of an object share most attributes."""
         parts = [getattr(thing, name) for name in names]
-        return tuple(self.of(part, partial(_same, part)) for part in parts)
+        return tuple(self.of(part, partial(_hashable_key, part)) for part in parts)
 
 
-def _same(value: Hashable) -> Hashable:
+def _hashable_key(value: Hashable) -> Hashable:
     return value
 
 
@@ -169,14 +169,14 @@ class Vehicles:
         return self._linear[key]
 
     def _make(self, scene: ReducedScene, speed: float) -> ReducedVehicle:
-        N = self._free_of(scene)
-        left = limited(self.linear(scene.vehicle, speed), self._mass_of(scene), N)
+        N = self._free_directions(scene)
+        left = limited(self.linear(scene.vehicle, speed), self._mass_matrix(scene), N)
         states = vehicle_states(left)
         if not len(states.A):
             raise InputError("", "effects", None, "the reduced vehicle has no degree of freedom left")
         return ReducedVehicle(left, N, states, np.linalg.solve(N.T @ self.mass @ N, N.T @ self.mass))
 
-    def _mass_of(self, scene: ReducedScene) -> np.ndarray:
+    def _mass_matrix(self, scene: ReducedScene) -> np.ndarray:
         """The mass matrix (n, n) of a scene, which springs and locks do not change; made once."""
         names = scene.limits.massless
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "joint_elements"), names
@@ -184,7 +184,7 @@ class Vehicles:
             self._masses[key] = massless(scene.vehicle, names)
         return self._masses[key]
 
-    def _free_of(self, scene: ReducedScene) -> np.ndarray:
+    def _free_directions(self, scene: ReducedScene) -> np.ndarray:
         """The matrix N (n, r) of a scene, which bars, tyres and masses do not change; made once."""
         limits = scene.limits
         key = *self._numbers.of_parts(scene.vehicle, "bodies", "springs"), limits.rigid, limits.locked
@@ -222,7 +222,7 @@ class FullScene:
         weightings = self.scene.ride.weighting
         if not weightings:
             return reduced
-        system = weighted(reduced.system, weightings)
+        system = system_with_weightings(reduced.system, weightings)
         more, names = np.eye(len(system.A) - reduced.states), tuple(weightings.values())
         T, left = block_diag(reduced.T, more), block_diag(reduced.left, more)
         return replace(reduced, system=system, T=T, left=left, weightings=names)
@@ -233,11 +233,11 @@ class FullScene:
         states, N = vehicle.states, vehicle.N
         system, Tq = first_order(vehicle.linear, states, excitation, self.speed)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
-        inert, road = len(states.inert), len(states.A)
+        inert, road = len(states.massless_part), len(states.A)
         q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])
         left = np.zeros((x, 2 * n + m))
-        left[:inert, :n] = left[inert : 2 * inert, n : 2 * n] = states.inert @ vehicle.behind
-        left[2 * inert : road, :n], left[road:, 2 * n :] = states.slow @ vehicle.behind, left_f
+        left[:inert, :n] = left[inert : 2 * inert, n : 2 * n] = states.massless_part @ vehicle.residual_flexibility
+        left[2 * inert : road, :n], left[road:, 2 * n :] = states.integrated_part @ vehicle.residual_flexibility, left_f
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
     def road(self, scene: ReducedScene) -> Excitation:
@@ -245,15 +245,15 @@ class FullScene:
         return self._heights(scene)[0]
 
     def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
-        """The road of the reduced scene, and the matrices of ``_of_road`` for it."""
+        """The road of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
         key = self.vehicles.roads.number(scene)
         if key not in self._roads:
             excitation = self.vehicles.roads.of(scene)
-            self._roads[key] = (excitation, *_of_road(self.scene, self.excitation, scene, excitation))
+            self._roads[key] = (excitation, *_filter_state_maps(self.scene, self.excitation, scene, excitation))
         return self._roads[key]
 
 
-def _of_road(
+def _filter_state_maps(
     scene: ReducedScene, full_road: Excitation, less: ReducedScene, reduced_road: Excitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Matrices from the filter states of the reduced road to those of the full road, axle by axle, and back; states

@@ -6,11 +6,11 @@ from typing import Any
 
 from models.core.scene_effects import own_table
 from models.core.scene_file import parse
-from models.systems.ride.of_scene import CLOSED
+from models.systems.ride.of_scene import CLOSED_FORM_STUDY
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.vehicle_file import vehicle_path
 
-SCENE, VEHICLE = "reduced.toml", "reduced_vehicle.toml"
+SCENE_FILE_NAME, VEHICLE_FILE_NAME = "reduced.toml", "reduced_vehicle.toml"
 QUESTION_KEYS = ("quantities", "tolerance", "options")
 """Keys of a scene that belong to its question."""
 
@@ -19,10 +19,10 @@ def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     """Write the reduced scene and its vehicle into a folder; returns the path of the scene."""
     scene = own_table(reduced_scene.ride)
     whole = scene["vehicle"]["file"]
-    vehicle = reduced(parse(vehicle_path(whole, reduced_scene.ride.folder)), reduced_scene)
+    vehicle = reduced_tables(parse(vehicle_path(whole, reduced_scene.ride.folder)), reduced_scene)
     notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
-    with (folder / VEHICLE).open("x") as file:
-        file.write(toml({**vehicle, "notes": notes}))
+    with (folder / VEHICLE_FILE_NAME).open("x") as file:
+        file.write(toml_text({**vehicle, "notes": notes}))
     table = {key: value for key, value in scene.items() if key not in QUESTION_KEYS and value != "auto"}
     road = dict(table.get("road", {}))
     if "file" in road:
@@ -30,15 +30,15 @@ def write(reduced_scene: ReducedScene, folder: Path) -> Path:
     changes = {
         "title": f"{reduced_scene.ride.title}, less what was left out",
         "system": "ride",
-        "study": CLOSED,
-        "vehicle": {**scene["vehicle"], "file": VEHICLE},
+        "study": CLOSED_FORM_STUDY,
+        "vehicle": {**scene["vehicle"], "file": VEHICLE_FILE_NAME},
     }
-    with (folder / SCENE).open("x") as file:
-        file.write(toml({**table, **changes, **({"road": road} if road else {})}))
-    return folder / SCENE
+    with (folder / SCENE_FILE_NAME).open("x") as file:
+        file.write(toml_text({**table, **changes, **({"road": road} if road else {})}))
+    return folder / SCENE_FILE_NAME
 
 
-def reduced(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any]:
+def reduced_tables(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any]:
     """The tables of the full vehicle without the bars and the damping of tyres that are left out, and with the limits
     that reduce it.
     """
@@ -57,35 +57,35 @@ def reduced(table: dict[str, Any], reduced_scene: ReducedScene) -> dict[str, Any
     return changed | ({"reduced": given} if given else {})
 
 
-def toml(table: dict[str, Any]) -> str:
+def toml_text(table: dict[str, Any]) -> str:
     """Nested tables as a TOML file: plain keys first, then a block for each table and each table of a list."""
     lines, blocks = list[str](), list[str]()
     for key, value in table.items():
         if isinstance(value, dict) and not value:
             continue
         if isinstance(value, dict):
-            blocks += ["", f"[{_key(key)}]", *_lines(value)]
+            blocks += ["", f"[{_key_text(key)}]", *_table_lines(value)]
         elif isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
             for entry in value:
-                blocks += ["", f"[[{_key(key)}]]", *_lines(entry)]
+                blocks += ["", f"[[{_key_text(key)}]]", *_table_lines(entry)]
         else:
-            lines.append(f"{_key(key)} = {_value(value)}")
+            lines.append(f"{_key_text(key)} = {_value_text(value)}")
     return "\n".join([*lines, *blocks]) + "\n"
 
 
-def _lines(table: dict[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+def _table_lines(table: dict[str, Any]) -> list[str]:
+    return [f"{_key_text(key)} = {_value_text(value)}" for key, value in table.items() if value is not None]
 
 
-def _key(key: str) -> str:
+def _key_text(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
 
 
-def _value(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(_lines(value)) + " }" if value else "{}"
+        return "{ " + ", ".join(_table_lines(value)) + " }" if value else "{}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
+        return "[" + ", ".join(map(_value_text, value)) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return json.dumps(value) if isinstance(value, str) else repr(value)

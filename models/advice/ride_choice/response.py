@@ -16,14 +16,14 @@ RESPONSE_DIFFERENCE = 1e-7
 """Share of the largest response by which motions and the solve may differ at the frequency that is looked at."""
 
 
-class Read(NamedTuple):
+class OutputFactors(NamedTuple):
     """Factors of the requested outputs: of the motion q, q', q'' (q, n), and of heights and their rates (q, wheels)."""
 
     by_motion: tuple[np.ndarray, np.ndarray, np.ndarray]
     by_road: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "Read":
+    def of(cls, vehicle: LinearVehicle, rows: Sequence[int]) -> "OutputFactors":
         """Factors of the vehicle's outputs with these rows."""
         read, at = vehicle.read, list(rows)
         return cls(
@@ -36,17 +36,17 @@ class Response:
     """Transfer functions H (w, q, wheels) from road heights to outputs at frequencies (w,) in rad/s."""
 
     def __init__(self, vehicle: ReducedVehicle, rows: Sequence[int], omega: np.ndarray) -> None:
-        self.vehicle, self.s, self.read = vehicle, 1j * omega, Read.of(vehicle.linear, rows)
+        self.vehicle, self.s, self.read = vehicle, 1j * omega, OutputFactors.of(vehicle.linear, rows)
         self.by_heights = vehicle.linear.road_stiffness, vehicle.linear.road_damping
         self.motions = self._fractions()
-        self.H = self._between(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
+        self.H = self._modal_product(self.read.by_motion, self.by_heights) + polynomial(self.read.by_road, self.s)
 
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
         """Transfer functions (w, n, wheels) from heights to coordinates, and (w, q, n) from forces on coordinates to
         outputs.
         """
         one = np.eye(len(self.vehicle.linear.mass))
-        return self._between([one], self.by_heights), self._between(self.read.by_motion, [one])
+        return self._modal_product([one], self.by_heights), self._modal_product(self.read.by_motion, [one])
 
     def _fractions(self) -> np.ndarray | None:
         """Partial fractions 1 / (s - rate) (w, modes). None where the equations must be solved: without modes, or where
@@ -58,18 +58,18 @@ class Response:
         fractions = 1.0 / (self.s[:, None] - modes.rates)
         at = [int(abs(fractions).max(axis=1).argmax())]
         one = [np.eye(len(self.vehicle.linear.mass))]
-        by_motions = self._sum(fractions[at], one, self.by_heights, self.s[at])
-        by_solve = self._solved(one, self.by_heights, self.s[at])
+        by_motions = self._sum_over_modes(fractions[at], one, self.by_heights, self.s[at])
+        by_solve = self._product_by_solving(one, self.by_heights, self.s[at])
         same = abs(by_motions - by_solve).max() <= RESPONSE_DIFFERENCE * abs(by_solve).max()
         return fractions if same else None
 
-    def _between(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> np.ndarray:
+    def _modal_product(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> np.ndarray:
         """Product (w, i, j) of a polynomial in s of rows, the compliance, and a polynomial of columns."""
         if self.motions is None:
-            return self._solved(left, right, self.s)
-        return self._sum(self.motions, left, right, self.s)
+            return self._product_by_solving(left, right, self.s)
+        return self._sum_over_modes(self.motions, left, right, self.s)
 
-    def _sum(
+    def _sum_over_modes(
         self, fractions: np.ndarray, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray
     ) -> np.ndarray:
         states, modes = self.vehicle.states, self.vehicle.modes
@@ -79,9 +79,9 @@ class Response:
         columns = sum((to_motions @ part) * modes.rates[:, None] ** i for i, part in enumerate(right))
         each = rows.T[:, :, None] * columns[:, None, :]
         whole = (fractions @ each.reshape(len(each), -1)).reshape(len(s), *each.shape[1:])
-        return np.asarray(whole + polynomial(self._rest(left, right), s))
+        return np.asarray(whole + polynomial(self._remaining_polynomial(left, right), s))
 
-    def _rest(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _remaining_polynomial(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Coefficients, by power of s, of the polynomial that remains besides the partial fractions: s^k (s - A)^-1 =
         A^k (s - A)^-1 + sum s^(k-1-j) A^j.
 
@@ -99,8 +99,8 @@ class Response:
                     rest[k] += row @ moved[i + j - 1 - k] @ column
         return rest
 
-    def _solved(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
-        """The product of ``_between``, by solving the equations at every frequency."""
+    def _product_by_solving(self, left: Sequence[np.ndarray], right: Sequence[np.ndarray], s: np.ndarray) -> np.ndarray:
+        """The product of ``_modal_product``, by solving the equations at every frequency."""
         linear = self.vehicle.linear
         Z = polynomial((linear.stiffness, linear.damping, linear.mass), s)
         return np.asarray(polynomial(left, s) @ np.linalg.solve(Z, polynomial(right, s)))

@@ -18,18 +18,25 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from models.advice.ride_choice.reduced import Reduced
 from models.core.errors import InputError
-from models.ride.covariance import FINITE, StationaryCovariance, lyapunov, noise_of, silence, stationary
+from models.ride.covariance import (
+    FINITE,
+    StationaryCovariance,
+    lyapunov_solution,
+    noise_of,
+    rounding_thresholds,
+    stationary_covariance,
+)
 from models.ride.excited import DelayedSystem
 from models.ride.marginal import split_marginal
 
 SLOWEST_DECAY = 1e-9
 """Decay, by the fastest rate, below which a motion counts as one that does not die out."""
-HARDLY, TRUSTED = 1e-7, 1e-10
+EXACT_SOLVE_LIMIT, TRUSTED_VARIANCE_SHARE = 1e-7, 1e-10
 """The same below which motions are left to the exact solve, and the share of a variance that they may miss."""
 
 
 @dataclass(frozen=True)
-class Solved:
+class StationarySolution:
     """Stationary solution in extended precision: covariance P (n, n), adjoints L (quantities, n, n) and variances
     (quantities,).
     """
@@ -39,7 +46,7 @@ class Solved:
     variance: np.ndarray
 
 
-def solve(system: DelayedSystem, rows: list[int]) -> Solved:
+def solve(system: DelayedSystem, rows: list[int]) -> StationarySolution:
     """Covariance P and adjoints L of a system in which every mode is damped; InputError for a mode without a restoring
     force.
 
@@ -47,12 +54,12 @@ def solve(system: DelayedSystem, rows: list[int]) -> Solved:
     a variance is a small difference of large terms.
     """
     split = split_marginal(system.A)
-    if split.marginal:
+    if split.count_of_marginal_states:
         raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
     V, W, C = split.V, split.W, system.C[rows]
-    P = V @ lyapunov(split.S, W @ noise_of(system) @ W.T)[0] @ V.T
-    L = np.array([W.T @ lyapunov(split.S.T, np.outer(c, c))[0] @ W for c in C @ V])
-    return Solved(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
+    P = V @ lyapunov_solution(split.S, W @ noise_of(system) @ W.T)[0] @ V.T
+    L = np.array([W.T @ lyapunov_solution(split.S.T, np.outer(c, c))[0] @ W for c in C @ V])
+    return StationarySolution(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
 
 
 class Screen:
@@ -78,11 +85,11 @@ class Screen:
             self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
 
     @cached_property
-    def solved(self) -> Solved:
+    def extended_solution(self) -> StationarySolution:
         """The solution for ``base`` in extended precision, for the certificate."""
         return solve(self.base.system, self.rows)
 
-    def predicted(self, reduced: Reduced) -> np.ndarray:
+    def predicted_variances(self, reduced: Reduced) -> np.ndarray:
         """Predicted variances (quantities,) of the reduced system; inf where white noise passes to a quantity."""
         system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
         P, C = left @ self.P @ left.T, system.C[self.rows]
@@ -92,13 +99,13 @@ class Screen:
         white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
         return np.where(white, np.inf, np.maximum(J, 0.0))
 
-    def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
+    def certificate_sides(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
         """Two results for the variances (quantities,) that a certificate compares: from the P of ``base`` with the
         reduced L, and from the reduced P.
         """
         system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
         covariance = solve(system, self.rows)
-        P = left @ self.solved.P @ left.T
+        P = left @ self.extended_solution.P @ left.T
         half = system.A.astype(np.longdouble) @ P
         rest = half + half.T + noise_of(system)
         C = system.C[self.rows].astype(np.longdouble)
@@ -119,24 +126,24 @@ def solved_in_motions(reduced: Reduced, rows: list[int]) -> np.ndarray | None:
     rounding, where noise reaches a quantity at once, or where a motion hardly dies out, motions are not to be trusted.
     """
     system, modes = reduced.system, reduced.modes
-    if modes is None or has_undamped_motion(modes.rates, HARDLY) or any(d[rows].any() for d in system.D):
+    if modes is None or has_undamped_motion(modes.rates, EXACT_SOLVE_LIMIT) or any(d[rows].any() for d in system.D):
         return None
     P, C = modes.covariance(reduced.noise), system.C
     half = system.A @ P
     rest = modes.W @ (half + half.T + reduced.noise) @ modes.W.conj().T
     variance = ((C @ P) * C).sum(axis=1)
     missing = (modes.adjoint_of_motions(C) * rest.T).sum(axis=(1, 2)).real
-    told = np.isfinite(system.D).all(axis=(0, 2)) & (variance > silence(C, P))
-    if not (abs(missing[told]) <= TRUSTED * variance[told]).all() or not told[rows].all():
+    told = np.isfinite(system.D).all(axis=(0, 2)) & (variance > rounding_thresholds(C, P))
+    if not (abs(missing[told]) <= TRUSTED_VARIANCE_SHARE * variance[told]).all() or not told[rows].all():
         return None
     return np.asarray((variance + missing)[rows])
 
 
-def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
+def exact_variances(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solution of the reduced system, inf where a quantity has none. Raises
     InputError.
     """
-    return row_variances(stationary(reduced.system), rows)
+    return row_variances(stationary_covariance(reduced.system), rows)
 
 
 def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarray:
@@ -145,6 +152,6 @@ def row_variances(covariance: StationaryCovariance, rows: list[int]) -> np.ndarr
 
 
 def whole_variances(reduced: Reduced, rows: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Variances as from ``confirmed``, and levels (quantities,) below which variances are only rounding."""
-    covariance = stationary(reduced.system)
-    return row_variances(covariance, rows), silence(reduced.system.C[rows], covariance.P)
+    """Variances as from ``exact_variances``, and levels (quantities,) below which variances are only rounding."""
+    covariance = stationary_covariance(reduced.system)
+    return row_variances(covariance, rows), rounding_thresholds(reduced.system.C[rows], covariance.P)

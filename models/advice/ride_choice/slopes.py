@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.advice.ride_choice.response import Read, Response
+from models.advice.ride_choice.response import OutputFactors, Response
 from models.vehicles.linear_vehicle import LinearVehicle
 
 
@@ -28,7 +28,7 @@ class Shifts:
     @classmethod
     def of(cls, vehicle: LinearVehicle, other_vehicles: Sequence[LinearVehicle], rows: Sequence[int]) -> "Shifts":
         """Matrices of the other vehicles less those of ``vehicle``, for the outputs with these rows."""
-        before, *after = ([*_matrices(each, rows)] for each in (vehicle, *other_vehicles))
+        before, *after = ([*_matrices_and_readings(each, rows)] for each in (vehicle, *other_vehicles))
         moved = [np.array([each[i] for each in after]) - matrix for i, matrix in enumerate(before)]
         return cls(tuple(moved[:3]), tuple(moved[3:5]), tuple(moved[5:8]), tuple(moved[8:]))
 
@@ -38,8 +38,8 @@ class Shifts:
         return Shifts(*(tuple(each * present[:, None, None] for each in part) for part in parts))
 
 
-def _matrices(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
-    read = Read.of(vehicle, rows)
+def _matrices_and_readings(vehicle: LinearVehicle, rows: Sequence[int]) -> Iterator[np.ndarray]:
+    read = OutputFactors.of(vehicle, rows)
     yield from (vehicle.stiffness, vehicle.damping, vehicle.mass, vehicle.road_stiffness, vehicle.road_damping)
     yield from (*read.by_motion, *read.by_road)
 
@@ -56,8 +56,8 @@ class Sensitivity:
         q, back = response.coordinates()
         moved = met @ (N @ q).mT  # (v, w, q, n)
         back = back @ N.T
-        self.by_force = [_sums(back * s, moved) for s in powers]
-        self.by_column = [_sums(back * s, met) for s in powers[:2]]
+        self.by_force = [_frequency_sums(back * s, moved) for s in powers]
+        self.by_column = [_frequency_sums(back * s, met) for s in powers[:2]]
         self.by_row = [(moved * s).sum(axis=1).real for s in powers]
         self.by_road = [(met * s).sum(axis=1).real for s in powers[:2]]
 
@@ -80,7 +80,7 @@ class Sensitivity:
         return total
 
 
-def _sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
+def _frequency_sums(back: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """Real part (v, q, i, j) of the sums over frequencies w of products of ``back`` (w, q, i) and ``moved`` (v, w, q,
     j).
     """

@@ -9,9 +9,9 @@ import numpy as np
 from models.ride.weighting import WEIGHTINGS
 from models.road.excitation import Excitation
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 PER_DECADE = 8
-"""Panels of ``NODES`` Gauss points per decade."""
+"""Panels of ``GAUSS_NODES`` Gauss points per decade."""
 RESONANCE_EDGES = np.array([-30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0])
 """Edges of panels about a resonance, in half-widths."""
 PANEL_ANGLE, NARROW_PANELS = 8.0, 30
@@ -19,7 +19,7 @@ PANEL_ANGLE, NARROW_PANELS = 8.0, 30
 roads that know nothing of one another, for sums over quick turns vanish."""
 
 
-def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
+def frequency_panels(rates: np.ndarray, delay: float, frequency_limits: tuple[float, float]) -> tuple[np.ndarray, ...]:
     """Angular frequencies (w,) in rad/s from 0 to the upper limit, weights (w,) of a sum that approximates the integral
     over them, and whether axles are treated as independent, ``apart`` (w,).
 
@@ -34,11 +34,11 @@ def frequencies(rates: np.ndarray, delay: float, frequency_limits: tuple[float, 
     even = np.geomspace(low, high, max(2, round(PER_DECADE * np.log10(high / low))))
     edges = np.unique(np.concatenate([[0.0], even, inner[(inner > low) & (inner < high)]]))
     half = np.diff(edges) / 2
-    omega = (edges[:-1, None] + half[:, None] * (1 + NODES)).ravel()
-    return omega, (half[:, None] * WEIGHTS).ravel(), omega > late[-1]
+    omega = (edges[:-1, None] + half[:, None] * (1 + GAUSS_NODES)).ravel()
+    return omega, (half[:, None] * GAUSS_WEIGHTS).ravel(), omega > late[-1]
 
 
-def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
+def filter_states(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """States (v, w, m, k) of an axle's filter under unit noise, without delay, at speeds (v,) and frequencies (w,)."""
     corners, V = np.linalg.eig(excitation.F)
     driven = np.linalg.solve(V, excitation.G + 0j)
@@ -105,7 +105,7 @@ class Filters:
         }
 
 
-def together(
+def pair_factors(
     gains: Mapping[complex, Sequence[np.ndarray]], axle_pair: CornerPair, alone: bool
 ) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray]]:
     """Factors of a pair's density in the density of the quantities: (w, q) summed over single axles and, unless all are
@@ -113,13 +113,13 @@ def together(
     """
     first, second = (gains[corner] for corner in axle_pair.corners)
     axles = range(len(first))
-    own = sum(_product(first[i], second[i]) for i in axles)
+    own = sum(_noise_product(first[i], second[i]) for i in axles)
     return np.asarray(own), {} if alone else {
-        (i, j): 2.0 * _product(first[i], second[j]) for i, j in combinations(axles, 2)
+        (i, j): 2.0 * _noise_product(first[i], second[j]) for i, j in combinations(axles, 2)
     }
 
 
-def _product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _noise_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Product of (w, q, k) with the conjugate of (w, q, k), summed over the noises k: (w, q)."""
     return np.einsum("wqk,wqk->wq", first, second.conj())
 
@@ -138,7 +138,7 @@ def variances(
     by_noises = filters.by_noises(gains)
     for pair in filters.pairs:
         density = pair.density(speeds, omega)
-        own, shared = together(by_noises, pair, excitation.independent)
+        own, shared = pair_factors(by_noises, pair, excitation.independent)
         total += (density @ own).real if np.iscomplexobj(density) else density @ own.real
         for (i, j), met in shared.items():
             length = excitation.lengths[i] - excitation.lengths[j]

@@ -15,7 +15,7 @@ Automotive Handbook. Their figures are those of cars; these are for a truck with
 from dataclasses import dataclass
 
 from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
-from models.brake.controllers.per_wheel import ACCELERATION, SLIP, SMALLEST_FLOAT, Common
+from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, SLIP_BOUNDS, SMALLEST_FLOAT, Common
 from models.core.errors import InputError
 
 FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
@@ -37,11 +37,11 @@ class AccelerationPhases(Common):
 
     def __post_init__(self) -> None:
         self.check(
-            falls=(-ACCELERATION[1], -SMALLEST_FLOAT),
-            rises=ACCELERATION,
-            rises_fast=ACCELERATION,
-            slip=SLIP,
-            deep=SLIP,
+            falls=(-ACCELERATION_BOUNDS[1], -SMALLEST_FLOAT),
+            rises=ACCELERATION_BOUNDS,
+            rises_fast=ACCELERATION_BOUNDS,
+            slip=SLIP_BOUNDS,
+            deep=SLIP_BOUNDS,
             pulse=(0.0, 1000.0),
         )
         for name, kind in (("pulse", int), ("slow", bool)):

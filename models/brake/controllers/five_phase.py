@@ -17,7 +17,7 @@ with phase 1.
 
 from dataclasses import dataclass
 
-from models.brake.controllers.per_wheel import ACCELERATION, PRESSURE_RATE, SLIP, Common
+from models.brake.controllers.per_wheel import ACCELERATION_BOUNDS, PRESSURE_RATE, SLIP_BOUNDS, Common
 from models.core.errors import InputError
 
 
@@ -37,9 +37,9 @@ class FivePhase(Common):
 
     def __post_init__(self) -> None:
         self.check(
-            **dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION),
+            **dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION_BOUNDS),
             e4=(-1e4, 1e4),
-            deep=SLIP,
+            deep=SLIP_BOUNDS,
             **dict.fromkeys(("falling", "fast", "slow"), PRESSURE_RATE),
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
@@ -47,7 +47,7 @@ class FivePhase(Common):
         self.governed_by(_Logic, pressures=True)
 
 
-FIRST = 0
+FIRST_PHASE = 0
 
 
 def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
@@ -58,14 +58,14 @@ def end_of_phase(phase: int, settings: FivePhase) -> tuple[float, float]:
     return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
 
 
-def rate(phase: int, settings: FivePhase) -> float:
+def rate_of_phase(phase: int, settings: FivePhase) -> float:
     """Rate of the pressure (bar/s) in a phase."""
     return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
 
 
 class _Logic:
     def __init__(self, settings: FivePhase) -> None:
-        self._settings, self._phase, self._pressure = settings, FIRST, 0.0
+        self._settings, self._phase, self._pressure = settings, FIRST_PHASE, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
         sign, level = end_of_phase(self._phase, self._settings)
@@ -75,7 +75,7 @@ class _Logic:
             self._phase = 5
         if self._phase != 1 and slip > self._settings.deep:
             self._phase = 1
-        raised = self._pressure + rate(self._phase, self._settings) * self._settings.period
+        raised = self._pressure + rate_of_phase(self._phase, self._settings) * self._settings.period
         self._pressure = min(max(raised, 0.0), supply)
         return self._pressure
 

@@ -2,8 +2,8 @@
 
 The vehicle's speed v stays, the wheel obeys J w' = r F(s) - T, and pressure rises and falls at the rates of the phases,
 so that the controller is the continuous one of its author: phases end when r w' meets its threshold, not at samples.
-Torque between two switches is linear but for the corners of the brake's loop; steps end there too. ``sampled`` is the
-same wheel under the same controller as it runs, by samples.
+Torque between two switches is linear but for the corners of the brake's loop; steps end there too. ``sampled_cycle`` is
+the same wheel under the same controller as it runs, by samples.
 """
 
 import math
@@ -15,15 +15,15 @@ import numpy as np
 
 from models.brake.brake import Brake, Brakes, of_wheels, torque
 from models.brake.controller import SAMPLE, Sample
-from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate
+from models.brake.controllers.five_phase import FivePhase, end_of_phase, rate_of_phase
 from models.brake.wheel_step import Grip, StepInput, Wheel, node_force, wheel_step
 from models.core.errors import InputError, RunFailed
 from models.machine.compiled import njit
-from models.tyre.tyre_table import Cells, TyreTable, cell_and_share, stacked
+from models.tyre.tyre_table import TableCell, TyreTable, cell_and_share, stacked_tables
 
 LONGEST_PHASE = 1.0
 """Time (s) after which a phase is taken never to end."""
-CLOSED = 1e-9
+CLOSED_CYCLE_TOLERANCE = 1e-9
 """Relative change of slip and torque from one cycle to the next one at which it is the limit cycle."""
 
 
@@ -38,7 +38,7 @@ class WheelState(NamedTuple):
     impulse: float
 
 
-class Driven(NamedTuple):
+class ConstantSpeedWheel(NamedTuple):
     """A wheel of a vehicle at a constant speed (m/s): its radius (m) and inertia (kg m^2), the brake (of one wheel) and
     the grip of its tyre, as compiled functions take them."""
 
@@ -49,15 +49,15 @@ class Driven(NamedTuple):
     grip: Grip
 
 
-MET, BACK, LOCKS, ENDLESS = range(4)
+LEVEL_MET, OTHER_LEVEL_MET, WHEEL_LOCKS, NEVER_ENDS = range(4)
 """How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it
 does not end."""
-RELEASE, CLIMB, SLOW = 1, 2, 5
+RELEASE_PHASE, SPEED_UP_PHASE, SLOW_PHASE = 1, 2, 5
 """Phases in which pressure falls, in which the wheel gains speed, and that follows one in which it does so no more."""
 
 
 @dataclass(frozen=True, eq=False)
-class Frozen:
+class WheelAtSpeed:
     """A wheel with its load (N), radius (m), inertia (kg m^2) and brake, on a tyre table, at a speed (m/s)."""
 
     speed: float
@@ -79,11 +79,13 @@ class Frozen:
         return max(node_force(k, grip) for k in range(grip.slips.size))
 
     @cached_property
-    def driven(self) -> Driven:
-        """The wheel as a ``Driven``, the form that compiled functions take."""
-        tables, (j, q) = stacked([self.tyre]), cell_and_share(self.tyre.loads, self.load)
-        grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
-        return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
+    def driven(self) -> ConstantSpeedWheel:
+        """The wheel as a ``ConstantSpeedWheel``, the form that compiled functions take."""
+        tables, (j, q) = stacked_tables([self.tyre]), cell_and_share(self.tyre.loads, self.load)
+        grip = Grip(0, 0, 0.0, TableCell(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
+        return ConstantSpeedWheel(
+            float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip
+        )
 
     def rolling(self) -> WheelState:
         """A wheel that rolls without torque, at time 0."""
@@ -91,7 +93,7 @@ class Frozen:
 
 
 @njit(cache=True, error_model="numpy")
-def rim(state, driven):
+def rim_acceleration(state, driven):
     """Acceleration (m/s^2) of the wheel's rim."""
     radius, inertia = driven.radius, driven.inertia
     slip = min(max(1.0 - radius * state.turning / driven.vehicle_speed, 0.0), 1.0)
@@ -112,7 +114,7 @@ def go_on(state, rate, time, driven):
 
 
 @njit(cache=True, error_model="numpy")
-def corner(state, rate, brakes):
+def time_to_corner(state, rate, brakes):
     """Time (s) until the pressure reaches the next corner of the brake's hysteresis loop, or zero pressure; else
     infinite."""
     first = math.inf
@@ -128,39 +130,39 @@ def corner(state, rate, brakes):
 
 
 @njit(cache=True, error_model="numpy")
-def ended(state, sign, level, back, driven):
-    """MET if the rim's acceleration has passed ``level`` in the direction ``sign``, BACK if it is at most ``back``
-    (m/s^2), else -1."""
-    now = rim(state, driven)
-    return MET if sign * (now - level) >= 0.0 else BACK if now <= back else -1
+def phase_end(state, sign, level, back, driven):
+    """MET if the rim's acceleration has passed ``level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at most
+    ``back`` (m/s^2), else -1."""
+    now = rim_acceleration(state, driven)
+    return LEVEL_MET if sign * (now - level) >= 0.0 else OTHER_LEVEL_MET if now <= back else -1
 
 
 @njit(cache=True, error_model="numpy")
-def phase(state, rate, sign, level, back, step, driven):
+def integrate_phase(state, rate, sign, level, back, step, driven):
     """Integrate one phase from ``state`` at a constant rate of pressure (bar/s) in steps (s): the last state, and how
     the phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
-    began, end = state.time, ended(state, sign, level, back, driven)
+    began, end = state.time, phase_end(state, sign, level, back, driven)
     while end < 0:
-        time = min(step, corner(state, rate, driven.brakes))
+        time = min(step, time_to_corner(state, rate, driven.brakes))
         after = go_on(state, rate, time, driven)
-        end = ended(after, sign, level, back, driven)
+        end = phase_end(after, sign, level, back, driven)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
-                if ended(go_on(state, rate, middle, driven), sign, level, back, driven) >= 0:
+                if phase_end(go_on(state, rate, middle, driven), sign, level, back, driven) >= 0:
                     high = middle
                 else:
                     low = middle
             after = go_on(state, rate, high, driven)
         state = after
         if end < 0 and not (state.turning > 0.0 or rate < 0.0):
-            return state, LOCKS
+            return state, WHEEL_LOCKS
         if end < 0 and state.time - began > LONGEST_PHASE:
-            return state, ENDLESS
+            return state, NEVER_ENDS
     return state, end
 
 
@@ -175,7 +177,7 @@ class Cycle:
     slips: tuple[float, ...]
 
 
-def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most: int = 60) -> Cycle:
+def limit_cycle(frozen: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most: int = 60) -> Cycle:
     """Limit cycle of the continuous controller, reached from a wheel that rolls freely, in steps of at most ``step``
     (s).
 
@@ -187,18 +189,18 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
     state, _ = _state_at_end(frozen.rolling(), 0, controller, step, frozen)
     for _ in range(most):
         state = state._replace(time=0.0, impulse=0.0)
-        path, number = [state], RELEASE
-        while number <= SLOW:
+        path, number = [state], RELEASE_PHASE
+        while number <= SLOW_PHASE:
             state, end = _state_at_end(state, number, controller, step, frozen)
             path.append(state)
-            number = SLOW if end == BACK else number + 1
+            number = SLOW_PHASE if end == OTHER_LEVEL_MET else number + 1
         first = path[0]
-        if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED:
-            return _cycle(path, frozen)
+        if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED_CYCLE_TOLERANCE:
+            return _cycle_from_switches(path, frozen)
     raise RunFailed("braking", f"{most} cycles of the five phases do not close")
 
 
-def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
+def _cycle_from_switches(switch_states: list[WheelState], frozen: WheelAtSpeed) -> Cycle:
     """The ``Cycle`` computed from the wheel's states at the six switches between phases."""
     last, slips = switch_states[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in switch_states]
     durations = tuple(np.diff([state.time for state in switch_states]).tolist())
@@ -206,19 +208,21 @@ def _cycle(switch_states: list[WheelState], frozen: Frozen) -> Cycle:
 
 
 def _state_at_end(
-    state: WheelState, number: int, controller: FivePhase, step: float, frozen: Frozen
+    state: WheelState, number: int, controller: FivePhase, step: float, frozen: WheelAtSpeed
 ) -> tuple[WheelState, int]:
-    """State at the end of a phase, and whether it ended as MET or as BACK; raises RunFailed."""
+    """State at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed."""
     sign, level = end_of_phase(number, controller)
-    back = controller.e4 if number == CLIMB else -math.inf
-    state, end = phase(state, rate(number, controller), sign, level, back, step, frozen.driven)
-    if end == ENDLESS or (end == LOCKS and number != 0):
-        what = f"the wheel locks in phase {number}" if end == LOCKS else f"phase {number} does not end"
+    back = controller.e4 if number == SPEED_UP_PHASE else -math.inf
+    state, end = integrate_phase(state, rate_of_phase(number, controller), sign, level, back, step, frozen.driven)
+    if end == NEVER_ENDS or (end == WHEEL_LOCKS and number != 0):
+        what = f"the wheel locks in phase {number}" if end == WHEEL_LOCKS else f"phase {number} does not end"
         raise RunFailed("braking", what, state.time)
     return state, end
 
 
-def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5) -> Cycle:
+def sampled_cycle(
+    frozen: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
+) -> Cycle:
     """Mean over ``cycles`` cycles of the sampled controller, after the first ``skip`` ones; no durations and slips are
     given.
 

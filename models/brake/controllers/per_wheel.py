@@ -11,14 +11,14 @@ import numpy as np
 from models.brake.controller import APPLY, RELEASE, SAMPLE, Command, Sample
 from models.core.errors import InputError
 
-MEMORY = 0.1
+SLOPE_MEMORY = 0.1
 """s"""
 SMALLEST_FLOAT = 5e-324
 """What is above its negative is zero or more, and what is at most its negative is below zero."""
-ACCELERATION, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
+ACCELERATION_BOUNDS, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
 """Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s): no wheel, no valve is
 faster."""
-SLIP = (0.0, 1.0)
+SLIP_BOUNDS = (0.0, 1.0)
 """Bounds of thresholds of slip: a wheel that stands has 1."""
 
 
@@ -93,7 +93,7 @@ class PerWheel:
         speed = speed_of(sample.speed, wheels, self._estimate)
         slowing = self._mean_slowing(speed)
         if not sample.brake:
-            return self._all(0.0 if self._pressures else RELEASE)
+            return self._command_all(0.0 if self._pressures else RELEASE)
         out = [0.0] * self._wheels
         for k, (first, last) in enumerate(self._groups):
             wheel = min(wheels[first], wheels[last])
@@ -104,21 +104,21 @@ class PerWheel:
                 answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
                 out[first] = out[last] = answer
         if speed < self._common.cut_off:
-            return self._all(sample.supply if self._pressures else APPLY)
-        return self._said(out)
+            return self._command_all(sample.supply if self._pressures else APPLY)
+        return self._commands_of_logics(out)
 
     def _mean_slowing(self, speed: float) -> float:
-        """Mean acceleration of the vehicle (m/s^2), smoothed over about ``MEMORY`` seconds."""
+        """Mean acceleration of the vehicle (m/s^2), smoothed over about ``SLOPE_MEMORY`` seconds."""
         if self._speed == self._speed:
             latest = (speed - self._speed) / self._common.period
-            self._slowing += (latest - self._slowing) * min(self._common.period / MEMORY, 1.0)
+            self._slowing += (latest - self._slowing) * min(self._common.period / SLOPE_MEMORY, 1.0)
         self._speed = speed
         return self._slowing
 
-    def _all(self, answer: float) -> Command:
-        return self._said([answer] * self._wheels)
+    def _command_all(self, answer: float) -> Command:
+        return self._commands_of_logics([answer] * self._wheels)
 
-    def _said(self, answers: list[float]) -> Command:
+    def _commands_of_logics(self, answers: list[float]) -> Command:
         if self._pressures:
             return Command(pressures=np.array(answers, dtype=float))
         return Command(valves=np.array(answers, dtype=np.int64))
@@ -130,17 +130,17 @@ class SpeedEstimate:
 
     sample : s between two of them; first : slope (m/s^2) until one is learnt, chosen: with 10 a slip bang-bang takes
     10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry road, as it lets
-    them go too early, with 6 neither; steepest : deceleration (m/s^2) that no vehicle exceeds; margin : the slope by
-    the deceleration learnt; apart : s at least between the moments from which it is learnt. Wheels that are held at a
-    slip and never come back teach it nothing.
+    them go too early, with 6 neither; steepest_deceleration : deceleration (m/s^2) that no vehicle exceeds;
+    slope_margin : the slope by the deceleration learnt; least_interval : s at least between the moments from which it
+    is learnt. Wheels that are held at a slip and never come back teach it nothing.
     """
 
     sample: float
     first: float = 6.0
-    steepest: float = 10.0
-    gentlest: float = 1.0
-    margin: float = 1.2
-    apart: float = 0.15
+    steepest_deceleration: float = 10.0
+    gentlest_deceleration: float = 1.0
+    slope_margin: float = 1.2
+    least_interval: float = 0.15
 
     def __post_init__(self) -> None:
         self._speed, self._slope = math.nan, self.first
@@ -152,16 +152,16 @@ class SpeedEstimate:
         fastest = max(wheels)
         if self._speed != self._speed:
             self._speed = self._peak = fastest
-        self._learn(fastest)
+        self._learn_slope(fastest)
         self._speed = max(fastest, self._speed - self._slope * self.sample)
         return self._speed
 
-    def _learn(self, fastest: float) -> None:
+    def _learn_slope(self, fastest: float) -> None:
         """Determine the slope of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
         self._since += self.sample
-        if self._rising and fastest < self._fastest and self._since >= self.apart:
-            slope = self.margin * (self._peak - self._fastest) / self._since
-            self._slope = min(max(slope, self.gentlest), self.steepest)
+        if self._rising and fastest < self._fastest and self._since >= self.least_interval:
+            slope = self.slope_margin * (self._peak - self._fastest) / self._since
+            self._slope = min(max(slope, self.gentlest_deceleration), self.steepest_deceleration)
             self._peak, self._since = self._fastest, 0.0
         self._rising, self._fastest = fastest > self._fastest, fastest
 

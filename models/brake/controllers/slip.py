@@ -10,7 +10,7 @@ Rantzer, J. Ludemann, Synthesis of a model-based tire slip controller, Vehicle S
 from dataclasses import dataclass
 
 from models.brake.controller import APPLY, RELEASE
-from models.brake.controllers.per_wheel import SLIP, SMALLEST_FLOAT, Common
+from models.brake.controllers.per_wheel import SLIP_BOUNDS, SMALLEST_FLOAT, Common
 from models.core.errors import InputError
 
 
@@ -22,7 +22,7 @@ class SlipBangBang(Common):
     apply: float = 0.05
 
     def __post_init__(self) -> None:
-        self.check(release=SLIP, apply=SLIP)
+        self.check(release=SLIP_BOUNDS, apply=SLIP_BOUNDS)
         if not self.apply <= self.release < 1.0:
             raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
         self.governed_by(_BangBang)
@@ -51,7 +51,7 @@ class SlipPI(Common):
     mix: float = 0.0
 
     def __post_init__(self) -> None:
-        self.check(target=SLIP, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
+        self.check(target=SLIP_BOUNDS, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST_FLOAT, 10.0))
         self.governed_by(_Loop, pressures=True)
 
 

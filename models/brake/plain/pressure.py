@@ -14,7 +14,7 @@ from models.brake.brake import Brakes
 from models.brake.controller import APPLY, RELEASE, SLOW
 from models.brake.pressure import Air, Chambers
 
-ROUNDING = 1e-9
+STEP_END_SHARE = 1e-9
 """Share of a step at its ends in which a command counts as coming with the end."""
 
 
@@ -34,42 +34,44 @@ class Pressures:
         torques[0], steps = self.air.torque, len(torques) - 1
         step = self.sample / steps
         for n in range(steps):
-            within = [cut for cut in self._arrivals(n * step) if ROUNDING < cut / step < 1.0 - ROUNDING]
+            within = [
+                cut for cut in self._arrival_times(n * step) if STEP_END_SHARE < cut / step < 1.0 - STEP_END_SHARE
+            ]
             for now, then in pairwise([0.0, *within, step]):
-                self._press(self._reached(n * step + 0.5 * (now + then)), then - now)
+                self._advance_pressures(self._effective_command(n * step + 0.5 * (now + then)), then - now)
             torques[n + 1] = self.air.torque
 
     def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
         """Set pressures (W,) in bar at once and keep them over the next sample; fill its ``torques``."""
         self.air.pressure[:] = pressures
-        self._follow()
+        self._follow_hysteresis()
         torques[:] = self.air.torque
 
-    def _arrivals(self, time: float) -> list[float]:
+    def _arrival_times(self, time: float) -> list[float]:
         """Times (s) at which each command reaches the chambers, counted from ``time`` (s) in the latest sample."""
         latest = len(self.commands) - 1
         return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
-    def _reached(self, time: float) -> np.ndarray:
+    def _effective_command(self, time: float) -> np.ndarray:
         """The command that is effective in the chambers at a time (s) in the latest sample."""
-        known = [arrived for arrived, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
+        known = [arrived for arrived, late in zip(self.commands, self._arrival_times(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
-    def _press(self, valves: np.ndarray, time: float) -> None:
+    def _advance_pressures(self, valves: np.ndarray, time: float) -> None:
         """Update pressures and torques over a time (s) with constant valve states (W,)."""
         chambers, supply, before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
         fills = valves >= APPLY
         to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, before))
-        slow = chambers.slow if chambers.slow.size else chambers.fill
-        constants = np.where(valves == RELEASE, chambers.empty, np.where(valves == SLOW, slow, chambers.fill))
+        slow = chambers.slow if chambers.slow.size else chambers.fill_time
+        constants = np.where(valves == RELEASE, chambers.empty_time, np.where(valves == SLOW, slow, chambers.fill_time))
         left = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
         self.air.pressure[:] = to + (before - to) * left
-        self._follow()
+        self._follow_hysteresis()
         if np.isfinite(chambers.reservoir):
             taken = float(chambers.volumes @ ((self.air.pressure - before) * fills))
             self.air.supply[0] -= max(taken, 0.0) / chambers.reservoir
 
-    def _follow(self) -> None:
+    def _follow_hysteresis(self) -> None:
         """Update the torques: each stays between the lines of rising and of falling pressure in the hysteresis loop."""
         pressure, brakes = self.air.pressure, self.brakes
         rising = brakes.rising * np.maximum(pressure - brakes.push_out, 0.0)

@@ -42,14 +42,14 @@ class LaggingTyres:
     length: np.ndarray
     slope: float
     angle: np.ndarray
-    behind: float = 0.0
+    time_behind: float = 0.0
     taken: np.ndarray | None = None
 
     def reach(self, speeds: np.ndarray, half: float) -> None:
         """Advance the lagging angles to half a step (s) after the motion with speeds (2, W) along and across the wheels
         (m/s)."""
-        self.angle, self.taken = lag_on(self.angle, speeds, self.behind + half, self.length, self.slope)
-        self.behind = half
+        self.angle, self.taken = lag_on(self.angle, speeds, self.time_behind + half, self.length, self.slope)
+        self.time_behind = half
 
     def across(self, i: int, forwards: float) -> float:
         """Speed (m/s) across wheel i that corresponds to its lagging slip angle at the speed ``forwards`` (m/s) along

@@ -14,7 +14,7 @@ def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surfac
 
 def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
     (behind, ahead), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
-    first, last = _stretch(road, behind), _stretch(road, ahead)
+    first, last = _stretch_at(road, behind), _stretch_at(road, ahead)
     if last > first:
         on_left = distance[:, 1].mean() >= road.line
         sides = [int((road.left if on_left else road.right)[k]) for k in (first, last)]
@@ -27,12 +27,12 @@ def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
     return Surface(near, far, float(share) if near != far else 0.0)
 
 
-def _stretch(road: Road, x: float) -> int:
+def _stretch_at(road: Road, x: float) -> int:
     """Number of the stretch of road at x (m): the last one that begins at or before x."""
     return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
 
 
-def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) -> np.ndarray:
+def ground_paths(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) -> np.ndarray:
     """Positions (W, 2, 2) in m of a vehicle's points on the ground at both ends of a step (s); each point moves on a
     straight line.
 

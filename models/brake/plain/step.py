@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, FOLDED
-from models.brake.plain.road import in_row, under_wheels, ways
+from models.brake.plain.road import ground_paths, in_row, under_wheels
 from models.brake.plain.suspension import Suspension, TyreContact, WheelForces
-from models.brake.plain.tyre import Braked, Surface, WheelMotion, tyre
+from models.brake.plain.tyre import BrakedStep, Surface, WheelMotion, tyre
 from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
 
@@ -28,12 +28,12 @@ BLINK = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What a step of a vehicle needs: its wheels, tyres and road, steer angles (W,) in rad, and the speed ``regular``
-    (m/s) that replaces lower speeds in slip angles."""
+    """What a step of a vehicle needs: its wheels, tyres and road, steer angles (W,) in rad, and the speed
+    ``least_speed`` (m/s) that replaces lower speeds in slip angles."""
 
     on: OnRoad
     steer: np.ndarray
-    regular: float
+    least_speed: float
 
 
 @dataclass(eq=False)
@@ -43,7 +43,7 @@ class Moving:
 
     state: np.ndarray
     turning: np.ndarray
-    changes: np.ndarray
+    speed_changes: np.ndarray
     report: np.ndarray
     accelerations: np.ndarray
     lag: "LaggingTyres | None" = None
@@ -59,25 +59,25 @@ class Steps:
         """Advance the vehicle by a step between torques (2, W) in N m at its start and end; returns how the step ended
         and the time (s)."""
         half, (q, v) = 0.5 * self.step, moving.state
-        under, middle = self._under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
+        under, middle = self._surfaces_under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
         if moving.lag is not None:
-            moving.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
-        held = self._hold(moving, contacts, starts, under, middle, half)
+            moving.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
+        held = self._held_wheel_forces(moving, contacts, starts, under, middle, half)
         rates = self.vehicle.acceleration(q, v, held)
         moving.accelerations[:] = self._of_units(rates)
-        rest = self.rests(moving)
+        rest = self.time_of_rest(moving)
         if rest is not None:
             moving.state[0] += rest * v + 0.5 * rest**2 * rates
             moving.state[1, [0, 1, 2, *self.vehicle.turns]], moving.turning[:] = 0.0, 0.0
-            return (AT_REST, rest) if rest < self.step else (self._status(moving), self.step)
+            return (AT_REST, rest) if rest < self.step else (self._end_status(moving), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
-        moving.changes[:] = (speeds(contacts) - starts) / half
-        held = self._hold(moving, contacts, starts, under, torques, self.step)
+        moving.speed_changes[:] = (speeds(contacts) - starts) / half
+        held = self._held_wheel_forces(moving, contacts, starts, under, torques, self.step)
         after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
         moving.state[:], moving.turning[:] = after.reshape(2, -1), moving.report[:, SPINS]
-        return self._status(moving), self.step
+        return self._end_status(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
@@ -85,13 +85,13 @@ class Steps:
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
-        under = self._under(state, 0.0)
-        held = self._hold(moving, contacts, starts, under, none, self.step)
+        under = self._surfaces_under(state, 0.0)
+        held = self._held_wheel_forces(moving, contacts, starts, under, none, self.step)
         return self.vehicle.acceleration(state[0], state[1], held), moving.turning
 
-    def _status(self, moving: Moving) -> int:
+    def _end_status(self, moving: Moving) -> int:
         """How a step ends: the vehicle leans too far, a train folds, or neither."""
-        q, fold = moving.state[0], self.course.on.plane.fold
+        q, fold = moving.state[0], self.course.on.plane.jackknife_angle
         if not np.abs(q[self.vehicle.leans]).max() <= UPRIGHT:
             return OVER
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
@@ -101,19 +101,19 @@ class Steps:
         is the sum of the yaw coordinates up to it."""
         return np.concatenate((all_values[:2], np.cumsum([all_values[2], *all_values[self.vehicle.turns]])))
 
-    def _under(self, state: np.ndarray, time: float) -> list[Surface]:
+    def _surfaces_under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
         plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
             mine = plane.unit == k
-            paths[mine] = ways(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
+            paths[mine] = ground_paths(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
         return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
 
-    def _hold(
+    def _held_wheel_forces(
         self,
         moving: Moving,
         contacts: list[TyreContact],
@@ -125,16 +125,22 @@ class Steps:
         """Constant wheel forces over a time (s), from loads and motion at the contacts; fills the wheels' reports."""
         course = self.course
         for i, contact in enumerate(contacts):
-            motion = WheelMotion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
+            motion = WheelMotion(
+                starts[i],
+                moving.speed_changes[i],
+                contact.side_speed,
+                contact.side_speed_of_contact,
+                course.least_speed,
+            )
             if moving.lag is not None:
-                motion = replace(motion, across=moving.lag.across(i, max(motion.forwards, course.regular)))
+                motion = replace(motion, across=moving.lag.across(i, max(motion.forward_speed, course.least_speed)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
-            braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
+            braked = BrakedStep((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
             moving.report[i] = tyre(course.on.tables, surfaces[i], motion, contact.load, braked)
         spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
         return WheelForces(course.steer, moving.report[:, :2].copy(), spun)
 
-    def rests(self, moving: Moving) -> float | None:
+    def time_of_rest(self, moving: Moving) -> float | None:
         """Time (s) within the step at which the kinetic energy of the plane motion is least, if the vehicle is about to
         stop; else None."""
         plane, v, a = self.course.on.plane, self._of_units(moving.state[1]), moving.accelerations
@@ -150,4 +156,4 @@ class Steps:
 
 def speeds(contacts: list[TyreContact]) -> np.ndarray:
     """Speeds (W,) of the wheels' centres along them (m/s)."""
-    return np.array([contact.passing for contact in contacts])
+    return np.array([contact.side_speed for contact in contacts])

@@ -17,7 +17,7 @@ from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of
 
-UP = np.array([0.0, 0.0, 1.0])
+UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 def round_the_vertical(vector: np.ndarray) -> np.ndarray:
@@ -34,8 +34,8 @@ class TyreContact:
     axle: np.ndarray
     height: float
     load: float
-    passing: float
-    sliding: float
+    side_speed: float
+    side_speed_of_contact: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class WheelForces:
 
     steer: np.ndarray
     forces: np.ndarray
-    spun: np.ndarray
+    spin_moments: np.ndarray
 
 
 class Suspension:
@@ -60,7 +60,7 @@ class Suspension:
         self._joints = joint_rows(self.bodies, free)
         self._joint_stiffness, self._joint_damping, _, self._joint_inertia = joint_numbers(free)
         self.turns, self.leans = vehicle.turns, vehicle.leans
-        self._gravity = -free.gravity * UP
+        self._gravity = -free.gravity * UPWARD
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
         given = vehicle.handling.given
         chassis = chassis_of(given)
@@ -115,11 +115,11 @@ class Suspension:
         force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
         along = self._joint_held + self._joint_stiffness * (self._joints @ q) + self._joint_damping * (self._joints @ v)
         mass += self._joints.T * self._joint_inertia @ self._joints
-        force += self._by_tyres(motion, constant) + self._by_air(motion) - along @ self._joints
+        force += self._by_tyres(motion, constant) + self._drag_forces(motion) - along @ self._joints
         accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
 
-    def _by_air(self, motion: PlainMotion) -> np.ndarray:
+    def _drag_forces(self, motion: PlainMotion) -> np.ndarray:
         """Generalised forces (n,) of aerodynamic drag at the chassis' centre, opposite to its speed along the vehicle's
         heading."""
         centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
@@ -135,9 +135,9 @@ class Suspension:
             creep = contact.along * constant.forces[i, 0] + contact.axle * constant.forces[i, 1]
             moment = -contact.height * round_the_vertical(creep)
             rolling = contact.axle * (contact.axle @ moment)
-            total += hubs[i, FIRST:] @ (creep + contact.load * UP)
+            total += hubs[i, FIRST:] @ (creep + contact.load * UPWARD)
             total += motion.by_moment(int(self._hubs.rows[i]), moment - rolling)
-            total += motion.by_moment(self._carrying[i], rolling - contact.axle * constant.spun[i])
+            total += motion.by_moment(self._carrying[i], rolling - contact.axle * constant.spin_moments[i])
         return total
 
     def liveliness(self) -> float:
@@ -145,7 +145,9 @@ class Suspension:
         a speed of 1 m/s."""
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
-        across = np.array([[sliding.sliding for sliding in self.contacts(motion, straight)] for motion in motions])
+        across = np.array(
+            [[sliding.side_speed_of_contact for sliding in self.contacts(motion, straight)] for motion in motions]
+        )
         mass, _ = self.bodies.inertia(motions[0], self._gravity)
         damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
         return float(np.linalg.eigvals(damping).real.max())

@@ -12,11 +12,11 @@ import numpy as np
 from models.brake.plain.wheel import Force, WheelStep, wheel_step
 from models.tyre.tyre_table import Tables
 
-NEARLY = 0.98
+LOCKING_SLIP = 0.98
 """Slip from which on the force turns to that of a locked tyre, against the way in which it slides."""
 
 
-def weights(nodes: np.ndarray, value: float) -> np.ndarray:
+def interpolation_weights(nodes: np.ndarray, value: float) -> np.ndarray:
     """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
     inside = float(np.clip(value, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
@@ -43,60 +43,65 @@ class Friction:
     """A tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
     tables: Tables
-    under: Surface
+    surface: Surface
     angle: float
     load: float
 
-    def mixed(self, values: np.ndarray) -> np.ndarray:
+    def mixed_values(self, values: np.ndarray) -> np.ndarray:
         """Values on the surface, a mixture of the two tables' values among those of all tables (t, ...)."""
-        share = self.under.share
-        mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
+        share = self.surface.share
+        mixed: np.ndarray = (1.0 - share) * values[self.surface.first] + share * values[self.surface.second]
         return mixed
 
     def ahead(self) -> Force:
         """Force along the wheel as a function of slip."""
         t = self.tables
-        mu = np.einsum("a,f,tafs->ts", weights(t.angles, self.angle), weights(t.loads, self.load), t.mu_x)
-        return Force(t.slips, self.load * self.mixed(mu))
+        mu = np.einsum(
+            "a,f,tafs->ts",
+            interpolation_weights(t.angles, self.angle),
+            interpolation_weights(t.loads, self.load),
+            t.mu_x,
+        )
+        return Force(t.slips, self.load * self.mixed_values(mu))
 
     def aside(self, slip: float) -> float:
         """Magnitude (N) of the force across the wheel at a slip."""
-        t, by_angle = self.tables, weights(self.tables.angles, self.angle)
-        g = np.einsum("a,s,tas->t", by_angle, weights(t.slips, abs(slip)), t.g)
-        h = np.einsum("a,f,taf->t", by_angle, weights(t.loads, self.load), t.h)
-        return self.load * float(self.mixed(g * h))
+        t, by_angle = self.tables, interpolation_weights(self.tables.angles, self.angle)
+        g = np.einsum("a,s,tas->t", by_angle, interpolation_weights(t.slips, abs(slip)), t.g)
+        h = np.einsum("a,f,taf->t", by_angle, interpolation_weights(t.loads, self.load), t.h)
+        return self.load * float(self.mixed_values(g * h))
 
 
 @dataclass(frozen=True)
 class WheelMotion:
     """Motion of a wheel's centre: speed along the wheel at the start of a step and its mean rate of change (m/s,
-    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``regular`` (m/s) that
-    replaces lower ones."""
+    m/s^2), speeds along and across from which the slip angle is computed (m/s), and the speed ``least_speed`` (m/s)
+    that replaces lower ones."""
 
     start: float
     rate: float
     along: float
     across: float
-    regular: float
+    least_speed: float
 
     @property
-    def sense(self) -> float:
+    def direction(self) -> float:
         """Direction of motion at the step's start: 1 forwards, -1 backwards."""
         return 1.0 if self.start >= 0.0 else -1.0
 
     @property
-    def forwards(self) -> float:
+    def forward_speed(self) -> float:
         """Speed (m/s) in the direction in which the wheel started, at least 0."""
-        return max(self.sense * self.along, 0.0)
+        return max(self.direction * self.along, 0.0)
 
     @property
     def angle(self) -> float:
         """Magnitude (rad) of the slip angle."""
-        return math.atan2(abs(self.across), max(self.forwards, self.regular))
+        return math.atan2(abs(self.across), max(self.forward_speed, self.least_speed))
 
 
 @dataclass(frozen=True)
-class Braked:
+class BrakedStep:
     """Braking of a wheel over a step: torques of its brake (N m) at both ends, the step (s), radius (m), inertia (kg
     m^2), and the turning at the start (rad/s)."""
 
@@ -107,10 +112,10 @@ class Braked:
     turning: float
 
 
-def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: Braked) -> np.ndarray:
+def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
     """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
     mean slip, slip angle (rad), time locked (s), rotation (rad/s) at the end."""
-    friction, sense = Friction(tables, surface, motion.angle, load), motion.sense
+    friction, sense = Friction(tables, surface, motion.angle, load), motion.direction
     speeds = sense * motion.start, sense * (motion.start + braked.step * motion.rate)
     wheel = WheelStep(speeds, braked.torques, braked.step, braked.radius, braked.inertia)
     turning, ahead, slip, locked = wheel_step(wheel, sense * braked.turning, friction.ahead())
@@ -123,10 +128,10 @@ def tyre(tables: Tables, surface: Surface, motion: WheelMotion, load: float, bra
 def _turned_to_sliding(forces: np.ndarray, slip: float, motion: WheelMotion) -> np.ndarray:
     """Sizes (2,) of the forces along and across the wheel, turned towards its sliding direction as the wheel comes near
     to locking."""
-    sliding = np.array([motion.forwards, abs(motion.across)])
+    sliding = np.array([motion.forward_speed, abs(motion.across)])
     speed = float(np.hypot(*sliding))
-    if slip <= NEARLY or speed == 0.0:
+    if slip <= LOCKING_SLIP or speed == 0.0:
         return forces
-    share = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
+    share = min((slip - LOCKING_SLIP) / (1.0 - LOCKING_SLIP), 1.0)
     turned: np.ndarray = (1.0 - share) * forces + share * float(np.hypot(*forces)) * sliding / speed
     return turned

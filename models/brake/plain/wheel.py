@@ -12,9 +12,9 @@ import numpy as np
 
 SLOWEST_SPEED = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one."""
-SERIES = 1e-3
+SERIES_LIMIT = 1e-3
 """Argument below which a difference is summed as a series, to rounding in five terms."""
-LOCKED = 1.0
+LOCKED_SLIP = 1.0
 """Slip of a wheel that stands."""
 
 
@@ -27,7 +27,7 @@ class Force:
     forces: np.ndarray
 
     @property
-    def sliding(self) -> float:
+    def locked_force(self) -> float:
         """Force (N) at slip 1."""
         return float(self.forces[-1])
 
@@ -79,9 +79,9 @@ class WheelProgress:
     time: float
     slip: float
     impulse: float = 0.0
-    area: float = 0.0
+    slip_integral: float = 0.0
     locked: float = 0.0
-    freed: bool = False
+    has_been_freed: bool = False
 
 
 def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
@@ -91,95 +91,96 @@ def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[floa
     """
     slip = 1.0 - step_data.radius * turning / step_data.speed(0.0)
     at = WheelProgress(0.0, slip)
-    if slip > LOCKED:
-        stopping = force.sliding * step_data.radius + step_data.mean_torque(0.0)
+    if slip > LOCKED_SLIP:
+        stopping = force.locked_force * step_data.radius + step_data.mean_torque(0.0)
         if stopping * step_data.step <= -step_data.inertia * turning:
-            return turning + stopping * step_data.step / step_data.inertia, force.sliding, slip, 0.0
-        _pass(at, -step_data.inertia * turning / stopping, force.sliding, LOCKED)
+            return turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
+        _advance_at_slip(at, -step_data.inertia * turning / stopping, force.locked_force, LOCKED_SLIP)
     while at.time < step_data.step:
         if _stays_locked(step_data, at, force):
-            _lock(step_data, at, force)
-        elif _spins(step_data, at, force):
-            turned = _spin(step_data, at, force)
+            _advance_locked(step_data, at, force)
+        elif _is_spinning(step_data, at, force):
+            turned = _advance_spinning(step_data, at, force)
             if at.time >= step_data.step:
-                return turned, at.impulse / step_data.step, at.area / step_data.step, at.locked
+                return turned, at.impulse / step_data.step, at.slip_integral / step_data.step, at.locked
         else:
             _roll(step_data, at, force)
     return (
         step_data.speed(step_data.step) * (1.0 - at.slip) / step_data.radius,
         at.impulse / step_data.step,
-        at.area / step_data.step,
+        at.slip_integral / step_data.step,
         at.locked,
     )
 
 
-def _pass(progress: WheelProgress, time: float, force: float, slip: float) -> None:
+def _advance_at_slip(progress: WheelProgress, time: float, force: float, slip: float) -> None:
     """Advance the wheel's progress by a time (s) at a constant force (N) and slip."""
     progress.time, progress.slip = progress.time + time, slip
-    progress.impulse, progress.area = progress.impulse + force * time, progress.area + slip * time
+    progress.impulse, progress.slip_integral = progress.impulse + force * time, progress.slip_integral + slip * time
 
 
 def _stays_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
     """Whether the brake holds a locked wheel, by its torque now or by its mean torque over the remaining step."""
     holds = (
-        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius >= force.sliding
+        max(step_data.torque(progress.time), step_data.mean_torque(progress.time)) / step_data.radius
+        >= force.locked_force
     )
-    return progress.slip >= LOCKED and not progress.freed and holds
+    return progress.slip >= LOCKED_SLIP and not progress.has_been_freed and holds
 
 
-def _lock(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
+def _advance_locked(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """Advance a locked wheel until the brake torque falls below the torque of the sliding force, or the step ends."""
-    needed, time = force.sliding * step_data.radius, step_data.step - progress.time
+    needed, time = force.locked_force * step_data.radius, step_data.step - progress.time
     if step_data.torques[1] < needed:
         time = (
             (needed - step_data.torque(progress.time)) * step_data.step / (step_data.torques[1] - step_data.torques[0])
         )
-    _pass(progress, time, force.sliding, LOCKED)
-    progress.locked, progress.freed = progress.locked + time, True
+    _advance_at_slip(progress, time, force.locked_force, LOCKED_SLIP)
+    progress.locked, progress.has_been_freed = progress.locked + time, True
 
 
-def _excess(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
+def _excess_rate(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
     """Rate (m/s^2) of rim speed less twice the centre's speed, while the wheel slides at slip -1."""
     return (
         -step_data.radius
-        * (step_data.radius * force.sliding + step_data.mean_torque(progress.time))
+        * (step_data.radius * force.locked_force + step_data.mean_torque(progress.time))
         / step_data.inertia
         - 2.0 * step_data.gain
     )
 
 
-def _spins(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
+def _is_spinning(step_data: WheelStep, progress: WheelProgress, force: Force) -> bool:
     """Whether the rim's speed is above twice the centre's and stays there."""
-    return progress.slip < -1.0 or (progress.slip == -1.0 and _excess(step_data, progress, force) > 0.0)
+    return progress.slip < -1.0 or (progress.slip == -1.0 and _excess_rate(step_data, progress, force) > 0.0)
 
 
-def _spin(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
+def _advance_spinning(step_data: WheelStep, progress: WheelProgress, force: Force) -> float:
     """Advance a wheel that spins at a slip counted as -1, until the step ends or that slip is reached; returns its
     rotation (rad/s)."""
     turning, excess = (
         step_data.speed(progress.time) * (1.0 - progress.slip) / step_data.radius,
-        _excess(step_data, progress, force),
+        _excess_rate(step_data, progress, force),
     )
     ahead, time = step_data.radius * turning - 2.0 * step_data.speed(progress.time), step_data.step - progress.time
-    slowing = (step_data.radius * force.sliding + step_data.mean_torque(progress.time)) / step_data.inertia
+    slowing = (step_data.radius * force.locked_force + step_data.mean_torque(progress.time)) / step_data.inertia
     if excess < 0.0:
         time = min(time, -ahead / excess)
-    _pass(progress, time, -force.sliding, -1.0)
-    progress.freed = False
+    _advance_at_slip(progress, time, -force.locked_force, -1.0)
+    progress.has_been_freed = False
     return turning - slowing * time
 
 
 def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     """Advance a wheel with a slip between -1 and 1 until the step ends or the slip reaches one of them. The mean force
     follows from the wheel's momentum."""
-    before, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED)
+    before, mean, slip = progress.time, step_data.mean_torque(progress.time), min(progress.slip, LOCKED_SLIP)
     nodes, forces = force.both_ways()
     kappa = step_data.radius**2 / (step_data.inertia * step_data.mean_speed)
     rates = kappa * (mean / step_data.radius - forces) + (1.0 - nodes) * step_data.gain / step_data.mean_speed
     time, progress.slip, area = along_nodes(slip, nodes, rates, step_data.step - before)
     if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
         time = step_data.step - before
-    progress.time, progress.freed = before + time, False
+    progress.time, progress.has_been_freed = before + time, False
     if math.isclose(progress.time, step_data.step, rel_tol=1e-15):
         progress.time = step_data.step
     turning = [
@@ -188,7 +189,7 @@ def _roll(step_data: WheelStep, progress: WheelProgress, force: Force) -> None:
     progress.impulse += (
         step_data.inertia * (turning[1] - turning[0]) / step_data.radius + mean / step_data.radius * time
     )
-    progress.area += area
+    progress.slip_integral += area
 
 
 def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: float) -> tuple[float, float, float]:
@@ -208,20 +209,20 @@ def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, remaining: fl
         if time + needed >= remaining:
             rest = remaining - time
             z = grows * rest
-            moved = slip + rest * rate * _phi(1, z)
-            return remaining, moved, area + slip * rest + rate * rest**2 * _phi(2, z)
-        area += slip * needed + rate * needed**2 * _phi(2, grows * needed)
+            moved = slip + rest * rate * _phi_function(1, z)
+            return remaining, moved, area + slip * rest + rate * rest**2 * _phi_function(2, z)
+        area += slip * needed + rate * needed**2 * _phi_function(2, grows * needed)
         time, slip, rate = time + needed, float(nodes[k]), float(rates[k])
     return time, slip, area
 
 
 def _log_over(x: float) -> float:
     """log(1 + x) / x."""
-    return math.log1p(x) / x if abs(x) > SERIES else math.fsum((-x) ** k / (k + 1) for k in range(6))
+    return math.log1p(x) / x if abs(x) > SERIES_LIMIT else math.fsum((-x) ** k / (k + 1) for k in range(6))
 
 
-def _phi(order: int, z: float) -> float:
+def _phi_function(order: int, z: float) -> float:
     """phi_1(z) = (exp(z) - 1) / z or phi_2(z) = (exp(z) - 1 - z) / z^2."""
-    if abs(z) <= SERIES:
+    if abs(z) <= SERIES_LIMIT:
         return math.fsum(z**k / math.factorial(k + order) for k in range(6))
     return math.expm1(z) / z if order == 1 else (math.expm1(z) - z) / z**2

@@ -10,7 +10,7 @@ import numpy as np
 from models.brake.controller import APPLY, HOLD, LARGEST_PRESSURE, RELEASE, SLOW, Command, Controller, Sample
 from models.core.errors import RunFailed
 
-NAMES = (
+FAULT_NAMES = (
     "crash",
     "silence",
     "wrong length",
@@ -25,21 +25,21 @@ NAMES = (
 much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
 -1, 0, 1, or 2 where there are such valves; with a pressure below none, or above that of the supply."""
 
-STATES = frozenset((RELEASE, HOLD, APPLY))
-STATES_WITH_SLOW_APPLY = STATES | {SLOW}
+VALVE_STATES = frozenset((RELEASE, HOLD, APPLY))
+STATES_WITH_SLOW_APPLY = VALVE_STATES | {SLOW}
 """States of valves, and of those that can also apply slowly."""
 
 
-ROUNDING = 1e-9
+SUPPLY_ROUNDING = 1e-9
 """Share by which a pressure may exceed that of the supply."""
-HERE = Path(__file__).parent
+PORT_FOLDER = Path(__file__).parent
 LONGEST_ERROR_TEXT = 500
 """Characters that are kept of an error's text."""
 
 
 class ControllerFailed(RunFailed):
-    """A controller gave no answer, or one that cannot be used. name : one of ``NAMES``; number : of the sample; why :
-    the fault, as a phrase."""
+    """A controller gave no answer, or one that cannot be used. name : one of ``FAULT_NAMES``; number : of the sample;
+    why : the fault, as a phrase."""
 
     def __init__(self, sample: Sample, name: str, reason: str) -> None:
         reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST_ERROR_TEXT]
@@ -48,7 +48,10 @@ class ControllerFailed(RunFailed):
 
 
 def ask(
-    controller: Controller, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
+    controller: Controller,
+    sample: Sample,
+    states: frozenset[int] = VALVE_STATES,
+    maximum_pressure: float = LARGEST_PRESSURE,
 ) -> Command:
     """A controller's answer after checks; maximum_pressure : largest pressure (bar) allowed.
 
@@ -59,17 +62,17 @@ def ask(
     except RunFailed:
         raise
     except (Exception, SystemExit) as error:
-        raise ControllerFailed(sample, "crash", raised(error)) from error
+        raise ControllerFailed(sample, "crash", exception_text(error)) from error
     return checked_answer(command, sample, states, maximum_pressure)
 
 
-def raised(error: BaseException) -> str:
+def exception_text(error: BaseException) -> str:
     """Type and text of an exception, and the line of the user's file in which it was raised, or which called the code
     that raised it."""
     lines = [
         frame
         for frame in extract_tb(error.__traceback__)
-        if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE
+        if "site-packages" not in frame.filename and Path(frame.filename).parent != PORT_FOLDER
     ]
     where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
     return f"{type(error).__name__}: {error}"[: LONGEST_ERROR_TEXT - len(where)] + where
@@ -79,16 +82,16 @@ def raised(error: BaseException) -> str:
 class CheckedController:
     """A controller whose answers are checked before they are used."""
 
-    inner: Controller
-    states: frozenset[int] = STATES
+    controller: Controller
+    states: frozenset[int] = VALVE_STATES
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for a sample; raises ControllerFailed."""
-        return ask(self.inner, sample, self.states, sample.supply)
+        return ask(self.controller, sample, self.states, sample.supply)
 
 
 def checked_answer(
-    command: Command, sample: Sample, states: frozenset[int] = STATES, maximum_pressure: float = LARGEST_PRESSURE
+    command: Command, sample: Sample, states: frozenset[int] = VALVE_STATES, maximum_pressure: float = LARGEST_PRESSURE
 ) -> Command:
     """The controller's answer, if it has exactly one valve state or one pressure per wheel; else raises
     ControllerFailed."""
@@ -98,26 +101,26 @@ def checked_answer(
     whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
     if whole is not None and whole.shape == sample.wheels.shape and states.issuperset(whole.tolist()):
         return command
-    values = _array(command.pressures if command.valves is None else command.valves, sample)
+    values = _answer_array(command.pressures if command.valves is None else command.valves, sample)
     for value in values.tolist():
         if not math.isfinite(value):
             raise ControllerFailed(sample, "not a number", f"{value:g} for a wheel")
         if command.pressures is not None and value < 0.0:
             raise ControllerFailed(sample, "below zero", f"a pressure of {value:g} bar")
-        if command.pressures is not None and value > maximum_pressure * (1.0 + ROUNDING):
+        if command.pressures is not None and value > maximum_pressure * (1.0 + SUPPLY_ROUNDING):
             raise ControllerFailed(
                 sample, "too high", f"a pressure of {value:g} bar, above the {maximum_pressure:g} bar that there are"
             )
         if command.valves is not None and value not in states:
-            raise ControllerFailed(sample, "no state of a valve", f"{value:g} is none of {_listed(states)}")
+            raise ControllerFailed(sample, "no state of a valve", f"{value:g} is none of {_listed_text(states)}")
     return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
 
 
-def _listed(states: frozenset[int]) -> str:
+def _listed_text(states: frozenset[int]) -> str:
     return ", ".join(map(str, sorted(states)))
 
 
-def _array(values: object, sample: Sample) -> np.ndarray:
+def _answer_array(values: object, sample: Sample) -> np.ndarray:
     if np.ma.is_masked(values):
         raise ControllerFailed(sample, "not a number", "a masked value for a wheel")
     try:

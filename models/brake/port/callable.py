@@ -17,7 +17,7 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
 
     name : "module:Name", or "file.py:Name" with a path from ``folder``.
     """
-    make = _find(name, folder, file)
+    make = _callable_of_path(name, folder, file)
     try:
         made = make(wheels, **parameters)
     except (Exception, SystemExit) as error:
@@ -27,12 +27,12 @@ def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str,
     return made
 
 
-def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
+def _callable_of_path(name: str, folder: Path, file: str) -> Callable[..., Any]:
     place, _, attribute = name.rpartition(":")
     if not place or not attribute:
         raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')
     try:
-        module = _of_file(folder / place) if place.endswith(".py") else import_module(place)
+        module = _module_of_file(folder / place) if place.endswith(".py") else import_module(place)
     except (Exception, SystemExit) as error:
         raise InputError(file, "port.callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
     choices = tuple(key for key in vars(module) if not key.startswith("_"))
@@ -41,7 +41,7 @@ def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
     return getattr(module, attribute)
 
 
-def _of_file(path: Path) -> ModuleType:
+def _module_of_file(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

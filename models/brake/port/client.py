@@ -6,8 +6,8 @@ from pathlib import Path
 
 from models.brake.controller import Controller
 from models.brake.port.callable import named_controller
-from models.brake.port.frame import QUESTION, answer, sample
-from models.brake.port.socket_port import LOOPBACK
+from models.brake.port.frame import QUESTION_LAYOUT, answer_frame, sample_of_question
+from models.brake.port.socket_port import LOOPBACK_ADDRESS
 
 
 def serve(controller: Controller, port: int) -> int:
@@ -16,11 +16,11 @@ def serve(controller: Controller, port: int) -> int:
     Returns the number of answers.
     """
     count = 0
-    with socket.create_connection((LOOPBACK, port)) as link, link.makefile("rb") as reader:
+    with socket.create_connection((LOOPBACK_ADDRESS, port)) as link, link.makefile("rb") as reader:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        while len(frame := reader.read(QUESTION.size)) == QUESTION.size:
-            given = sample(frame)
-            link.sendall(answer(given.number, controller.sample(given)))
+        while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
+            given = sample_of_question(frame)
+            link.sendall(answer_frame(given.number, controller.sample(given)))
             count += 1
     return count
 

@@ -46,45 +46,45 @@ class Fault(Strict):
 
 
 @dataclass
-class Faulty:
+class FaultyController:
     """A controller whose signals and commands pass through faults; a new one is made for every run."""
 
-    inner: Controller
+    controller: Controller
     faults: list[Fault]
-    _past: deque[np.ndarray] = field(init=False)
-    _seen: np.ndarray | None = None
-    _valves: np.ndarray | None = None
+    _past_signals: deque[np.ndarray] = field(init=False)
+    _last_signals: np.ndarray | None = None
+    _last_valves: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
+        self._past_signals = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for faulty signals; the commands themselves also get their faults."""
         time = 1e-9 * sample.time
         here = [fault for fault in self.faults if fault.holds(time)]
-        command = self.inner.sample(sample._replace(wheels=self._signals(sample.wheels, here)))
-        return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
+        command = self.controller.sample(sample._replace(wheels=self._faulty_signals(sample.wheels, here)))
+        return command if command.valves is None else Command(valves=self._stuck_valves(np.array(command.valves), here))
 
-    def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
-        self._past.append(wheels)
+    def _faulty_signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
+        self._past_signals.append(wheels)
         seen = wheels.copy()
         for fault in here:
             for i in fault.of(wheels.size):
                 if fault.kind == "delayed":
-                    seen[i] = self._past[max(len(self._past) - 1 - (fault.samples or 0), 0)][i]
-                elif fault.kind == "lost" and self._seen is not None:
-                    seen[i] = self._seen[i]
-        self._seen = seen
+                    seen[i] = self._past_signals[max(len(self._past_signals) - 1 - (fault.samples or 0), 0)][i]
+                elif fault.kind == "lost" and self._last_signals is not None:
+                    seen[i] = self._last_signals[i]
+        self._last_signals = seen
         return seen
 
-    def _stuck(self, valves: np.ndarray, here: list[Fault]) -> np.ndarray:
+    def _stuck_valves(self, valves: np.ndarray, here: list[Fault]) -> np.ndarray:
         for fault in here:
             for i in fault.of(valves.size) if fault.kind == "stuck" else ():
                 if fault.state is not None:
                     valves[i] = fault.state
-                elif self._valves is not None:
-                    valves[i] = self._valves[i]
-        self._valves = valves
+                elif self._last_valves is not None:
+                    valves[i] = self._last_valves[i]
+        self._last_valves = valves
         return valves
 
 

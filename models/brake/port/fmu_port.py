@@ -19,7 +19,7 @@ from models.core.errors import InputError
 
 
 @contextmanager
-def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
+def opened_fmu(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
     """The controller of an FMU file, unpacked into a folder, as a context manager; sample: s.
 
     Raises InputError.
@@ -33,13 +33,13 @@ def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["Fm
         raise InputError(path.name, "fmu", None, f"is no FMU: {type(error).__name__}: {error}") from None
     if not description.fmiVersion.startswith("2.") or description.coSimulation is None:
         raise InputError(path.name, "fmu", description.fmiVersion, "must be of FMI 2 with co-simulation")
-    names = _names(description, wheels, path.name)
-    with _slave(description, str(folder), path.name) as slave:
+    names = _variables_by_name(description, wheels, path.name)
+    with _running_fmu(description, str(folder), path.name) as slave:
         yield FmuPort(slave, names, wheels, sample)
 
 
 @contextmanager
-def _slave(description: Any, folder: str, file: str) -> Iterator[Any]:
+def _running_fmu(description: Any, folder: str, file: str) -> Iterator[Any]:
     """The FMU, instantiated and initialised, as a context manager that frees it."""
     from fmpy.fmi2 import FMU2Slave
 
@@ -64,7 +64,7 @@ def _slave(description: Any, folder: str, file: str) -> Iterator[Any]:
         slave.freeInstance()
 
 
-OPTIONAL = {"supply": "Real", "speed": "Real", "brake": "Boolean"}
+OPTIONAL_INPUTS = {"supply": "Real", "speed": "Real", "brake": "Boolean"}
 """Inputs that an FMU may have."""
 
 
@@ -97,13 +97,13 @@ def _references(names: dict[str, tuple[int, str]], kind: str, wheels: int) -> li
     return [names[f"{kind}_{i + 1}"][0] for i in range(wheels)]
 
 
-def _names(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:
+def _variables_by_name(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:
     """Value reference and type of each variable, by name; raises InputError if one is missing or has the wrong type."""
     names = {variable.name: (variable.valueReference, variable.type) for variable in description.modelVariables}
     kind = "valve" if "valve_1" in names else "pressure"
     wanted: dict[str, tuple[str, ...]] = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}
     wanted |= {f"{kind}_{i + 1}": ("Real", "Integer") if kind == "valve" else ("Real",) for i in range(wheels)}
-    wanted |= {name: (kind_of,) for name, kind_of in OPTIONAL.items() if name in names}
+    wanted |= {name: (kind_of,) for name, kind_of in OPTIONAL_INPUTS.items() if name in names}
     for name, types in wanted.items():
         if name not in names:
             raise InputError(file, name, None, f"is missing: an FMU for {wheels} wheels has it, and its outputs")

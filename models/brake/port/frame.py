@@ -33,7 +33,7 @@ import numpy as np
 
 from models.brake.controller import Command, Sample
 
-QUESTION, ANSWER = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
+QUESTION_LAYOUT, ANSWER_LAYOUT = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
 MOST_WHEELS = 8
 SWITCH, REQUEST_GIVEN = 1, 2
 """Bits of the question's flags."""
@@ -47,10 +47,10 @@ class WrongFrame(ValueError):
         super().__init__(reason)
 
 
-def question(sample: Sample) -> bytes:
+def question_frame(sample: Sample) -> bytes:
     """Frame that carries one sample to the controller."""
     flags = SWITCH * sample.brake | REQUEST_GIVEN * (sample.speed == sample.speed)
-    return QUESTION.pack(
+    return QUESTION_LAYOUT.pack(
         b"TRQ1",
         sample.number,
         sample.time,
@@ -58,30 +58,30 @@ def question(sample: Sample) -> bytes:
         flags,
         sample.supply,
         sample.speed,
-        *_eight(sample.wheels),
+        *_eight_values(sample.wheels),
     )
 
 
-def sample(frame: bytes) -> Sample:
+def sample_of_question(frame: bytes) -> Sample:
     """The sample of a question; raises WrongFrame."""
-    if len(frame) != QUESTION.size:
-        raise WrongFrame("wrong length", f"a question of {len(frame)} bytes, not {QUESTION.size}")
-    magic, number, time, wheels, flags, supply, speed, *signals = QUESTION.unpack(frame)
+    if len(frame) != QUESTION_LAYOUT.size:
+        raise WrongFrame("wrong length", f"a question of {len(frame)} bytes, not {QUESTION_LAYOUT.size}")
+    magic, number, time, wheels, flags, supply, speed, *signals = QUESTION_LAYOUT.unpack(frame)
     if magic != b"TRQ1" or not 1 <= wheels <= MOST_WHEELS:
         raise WrongFrame("wrong frame", f"begins with {magic!r}, not with b'TRQ1' and 1 to {MOST_WHEELS} wheels")
     return Sample(number, time, np.array(signals[:wheels]), bool(flags & SWITCH), supply, speed)
 
 
-def answer(number: int, command: Command) -> bytes:
+def answer_frame(number: int, command: Command) -> bytes:
     """Frame that carries a controller's answer to a sample."""
     mode, values = (b"P", command.pressures) if command.valves is None else (b"V", command.valves)
     assert values is not None
-    return ANSWER.pack(b"TRA1", number, mode[0], len(values), *_eight(values))
+    return ANSWER_LAYOUT.pack(b"TRA1", number, mode[0], len(values), *_eight_values(values))
 
 
-def command(frame: bytes, number: int) -> Command:
+def command_of_answer(frame: bytes, number: int) -> Command:
     """The commands in the answer frame; raises WrongFrame if the frame does not answer the sample ``number``."""
-    magic, answered, mode, wheels, *values = ANSWER.unpack(frame)
+    magic, answered, mode, wheels, *values = ANSWER_LAYOUT.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
     if answered != number:
@@ -92,6 +92,6 @@ def command(frame: bytes, number: int) -> Command:
     return Command(pressures=array) if mode == ord("P") else Command(valves=array)
 
 
-def _eight(values: np.ndarray) -> list[float]:
+def _eight_values(values: np.ndarray) -> list[float]:
     """Eight values, one per possible wheel: the given ones, then zeros."""
     return [*np.asarray(values, dtype=float).tolist(), *[0.0] * (MOST_WHEELS - len(values))]

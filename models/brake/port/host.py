@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.brake.controller import Controller
-from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, ask, raised
-from models.brake.port.frame import QUESTION, answer, sample
-from models.brake.port.socket_port import LOOPBACK
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, ControllerFailed, ask, exception_text
+from models.brake.port.frame import QUESTION_LAYOUT, answer_frame, sample_of_question
+from models.brake.port.socket_port import LOOPBACK_ADDRESS
 from models.core.errors import InputError
 
-LENGTH, READY, TOLD = struct.Struct("<Q"), b"TRR1", b"TRE1"
-HEAD = struct.Struct("<4sI")
+LENGTH_LAYOUT, READY_MARK, TOLD_MARK = struct.Struct("<Q"), b"TRR1", b"TRE1"
+HEAD_LAYOUT = struct.Struct("<4sI")
 
 
-class Guest(NamedTuple):
+class HostedController(NamedTuple):
     """Description of a controller that a separate process creates: "module:Name" or "file.py:Name" of a callable, or
     the path of an FMU.
 
@@ -41,12 +41,12 @@ class Guest(NamedTuple):
 
 
 @contextmanager
-def made_controller(guest: Guest) -> Iterator[Controller]:
+def made_controller(guest: HostedController) -> Iterator[Controller]:
     """The controller described by ``guest``, as a context manager; raises InputError."""
     if guest.fmu is not None:
-        from models.brake.port.fmu_port import opened
+        from models.brake.port.fmu_port import opened_fmu
 
-        with opened(guest.fmu, guest.folder, guest.wheels, guest.sample) as fmu:
+        with opened_fmu(guest.fmu, guest.folder, guest.wheels, guest.sample) as fmu:
             yield fmu
     else:
         from models.brake.port.callable import named_controller
@@ -57,26 +57,26 @@ def made_controller(guest: Guest) -> Iterator[Controller]:
 def failure_frame(**what: Any) -> bytes:
     """Frame that reports the exception now being handled."""
     text = json.dumps(what, default=str).encode()
-    return HEAD.pack(TOLD, len(text)) + text
+    return HEAD_LAYOUT.pack(TOLD_MARK, len(text)) + text
 
 
 def serve(link: socket.socket) -> None:
     """Make the controller that the other side asks for, and answer samples until the connection closes."""
     with link.makefile("rb") as reader:
-        guest = pickle.loads(reader.read(LENGTH.unpack(reader.read(LENGTH.size))[0]))
+        guest = pickle.loads(reader.read(LENGTH_LAYOUT.unpack(reader.read(LENGTH_LAYOUT.size))[0]))
         if guest.fmu is not None:
             import fmpy.fmi2  # noqa: F401 the library's time is none of the FMU's
-        link.sendall(HEAD.pack(READY, 0))
+        link.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
         with made_controller(guest) as controller:
-            link.sendall(HEAD.pack(READY, 0))
-            while len(frame := reader.read(QUESTION.size)) == QUESTION.size:
-                given = sample(frame)
-                link.sendall(answer(given.number, ask(controller, given, STATES_WITH_SLOW_APPLY)))
+            link.sendall(HEAD_LAYOUT.pack(READY_MARK, 0))
+            while len(frame := reader.read(QUESTION_LAYOUT.size)) == QUESTION_LAYOUT.size:
+                given = sample_of_question(frame)
+                link.sendall(answer_frame(given.number, ask(controller, given, STATES_WITH_SLOW_APPLY)))
 
 
 def main(port: int) -> None:
     """Serve at a port of this machine; any exception is reported to the other side if possible."""
-    with socket.create_connection((LOOPBACK, port)) as link:
+    with socket.create_connection((LOOPBACK_ADDRESS, port)) as link:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
             serve(link)
@@ -88,7 +88,7 @@ def main(port: int) -> None:
                 file=error.file, place=error.place, value=error.value, allowed=error.allowed, choices=error.choices
             )
         except BaseException as error:
-            what = failure_frame(name="crash", reason=raised(error))
+            what = failure_frame(name="crash", reason=exception_text(error))
         with suppress(OSError):  # nobody is left to hear it
             link.sendall(what)
 

@@ -17,15 +17,15 @@ from socket import socket
 from typing import Any
 
 from models.brake.controller import Command, Sample
-from models.brake.port.ask import NAMES, ControllerFailed
-from models.brake.port.frame import ANSWER, WrongFrame, command, question
-from models.brake.port.host import HEAD, LENGTH, READY, TOLD, Guest
-from models.brake.port.socket_port import START_REMEDY, connected, fate
+from models.brake.port.ask import FAULT_NAMES, ControllerFailed
+from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer, question_frame
+from models.brake.port.host import HEAD_LAYOUT, LENGTH_LAYOUT, READY_MARK, TOLD_MARK, HostedController
+from models.brake.port.socket_port import START_REMEDY, controller_behind_socket, end_of_process
 from models.core.errors import InputError, RunFailed
 
 FAILURE_TEXT_BYTES = 100_000
 """Bytes of what a process may tell of its failure."""
-STARTUP = 30.0
+STARTUP_SECONDS = 30.0
 """s for the process to be there, with all that the host needs, before it touches the controller."""
 
 
@@ -38,58 +38,68 @@ class Failed(Exception):
 
 
 @dataclass
-class Hosted:
+class ProcessController:
     """A controller in its own process; each answer must arrive within ``timeout`` seconds."""
 
     link: socket
     process: subprocess.Popen[bytes] | None
     timeout: float
 
-    def begin(self, guest: Guest, start: float) -> None:
+    def begin(self, guest: HostedController, start: float) -> None:
         """Have the process make the controller within ``start`` seconds; raises InputError, RunFailed."""
         text = pickle.dumps(guest)
         try:
-            self._got(LENGTH.pack(len(text)) + text, HEAD.size, READY, STARTUP)
-            self._got(b"", HEAD.size, READY, start)
+            self._receive(LENGTH_LAYOUT.pack(len(text)) + text, HEAD_LAYOUT.size, READY_MARK, STARTUP_SECONDS)
+            self._receive(b"", HEAD_LAYOUT.size, READY_MARK, start)
         except Failed as error:
             raise _as_input(error.what) from None
         except TimeoutError:
             raise RunFailed("controller", f"silence: it was not made within {start:g} s; {START_REMEDY}") from None
         except (OSError, EOFError):
-            raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
+            raise RunFailed(
+                "controller", f"crash: it ended as it was made{end_of_process(self.process, self.timeout)}"
+            ) from None
 
     def sample(self, sample: Sample) -> Command:
         """The commands of a controller in another process for a sample; raises ControllerFailed."""
         try:
-            return command(self._got(question(sample), ANSWER.size, b"", self.timeout), sample.number)
+            return command_of_answer(
+                self._receive(question_frame(sample), ANSWER_LAYOUT.size, b"", self.timeout), sample.number
+            )
         except WrongFrame as error:
             raise ControllerFailed(sample, error.name, str(error)) from None
         except Failed as error:
             name = str(error.what.get("name"))
-            raise ControllerFailed(sample, name if name in NAMES else "crash", str(error.what.get("reason"))) from None
+            raise ControllerFailed(
+                sample, name if name in FAULT_NAMES else "crash", str(error.what.get("reason"))
+            ) from None
         except TimeoutError:
             raise ControllerFailed(sample, "silence", f"no answer within {self.timeout:g} s") from None
         except (OSError, EOFError):
-            lost = f"the controller was lost{fate(self.process, self.timeout)}"
+            lost = f"the controller was lost{end_of_process(self.process, self.timeout)}"
             raise ControllerFailed(sample, "crash", lost) from None
 
-    def _got(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
+    def _receive(self, sent: bytes, size: int, begins: bytes, seconds: float) -> bytes:
         """The bytes that the process sends back within ``seconds``; raises Failed, TimeoutError, OSError, EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(sent)
-        got = self._more(b"", size, end)
-        if got[:4] == TOLD:
-            length = HEAD.unpack_from(got)[1]
-            raise Failed(json.loads(self._more(got, min(HEAD.size + length, FAILURE_TEXT_BYTES), end)[HEAD.size :]))
+        got = self._receive_more(b"", size, end)
+        if got[:4] == TOLD_MARK:
+            length = HEAD_LAYOUT.unpack_from(got)[1]
+            raise Failed(
+                json.loads(
+                    self._receive_more(got, min(HEAD_LAYOUT.size + length, FAILURE_TEXT_BYTES), end)[HEAD_LAYOUT.size :]
+                )
+            )
         if not got.startswith(begins):
             raise EOFError
         return got
 
-    def _more(self, received: bytes, size: int, end: float) -> bytes:
+    def _receive_more(self, received: bytes, size: int, end: float) -> bytes:
         """Receive until ``size`` bytes are there, or until a complete, shorter frame reports a failure."""
         while len(received) < size and not (
-            received[:4] == TOLD and HEAD.size <= len(received) == _failure_length(received)
+            received[:4] == TOLD_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
         ):
             part = self.link.recv(size - len(received))
             left = end - time.perf_counter()
@@ -105,7 +115,7 @@ class Hosted:
 
 def _failure_length(received: bytes) -> int:
     """Length of the frame that reports a failure, read from its head."""
-    return HEAD.size + int(HEAD.unpack_from(received)[1])
+    return HEAD_LAYOUT.size + int(HEAD_LAYOUT.unpack_from(received)[1])
 
 
 def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
@@ -115,13 +125,13 @@ def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
 
 
 @contextmanager
-def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
+def controller_in_process(guest: HostedController, timeout: float, start: float) -> Iterator[ProcessController]:
     """The controller of a guest in a separate process, as a context manager; start : seconds allowed for making it.
 
     However the block ends, no process of it stays. Raises InputError, RunFailed.
     """
     code = f"import sys; sys.path[:] = {sys.path!r}; from models.brake.port.host import main; main(int(sys.argv[1]))"
-    with connected([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP) as port:
-        host = Hosted(port.link, port.process, timeout)
+    with controller_behind_socket([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP_SECONDS) as port:
+        host = ProcessController(port.link, port.process, timeout)
         host.begin(guest, start)
         yield host

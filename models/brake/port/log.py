@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 from models.brake.controller import Command, Controller, Sample
-from models.brake.port.frame import ANSWER, QUESTION, answer, command, question
+from models.brake.port.frame import ANSWER_LAYOUT, QUESTION_LAYOUT, answer_frame, command_of_answer, question_frame
 from models.core.errors import InputError, RunFailed
 
-TITLE = b"twinrig braking port log 1\n"
-RECORD = QUESTION.size + ANSWER.size
+LOG_TITLE = b"twinrig braking port log 1\n"
+RECORD_LENGTH = QUESTION_LAYOUT.size + ANSWER_LAYOUT.size
 
 
 def name_of(scene: str) -> str:
@@ -25,29 +25,29 @@ def name_of(scene: str) -> str:
 
 
 @dataclass
-class Logged:
+class LoggedController:
     """A controller whose exchanges are written to a log as they happen."""
 
-    inner: Controller
+    controller: Controller
     file: BinaryIO
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for a sample, which are also written to the log."""
-        asked = question(sample)  # before a controller can write into what it is given
-        said = self.inner.sample(sample)
-        self.file.write(asked + answer(sample.number, said))
+        asked = question_frame(sample)  # before a controller can write into what it is given
+        said = self.controller.sample(sample)
+        self.file.write(asked + answer_frame(sample.number, said))
         return said
 
 
 @contextmanager
-def logged(inner: Controller, path: Path, scene: str) -> Iterator[Logged]:
-    """The controller ``inner``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
+def logged_controller(inner: Controller, path: Path, scene: str) -> Iterator[LoggedController]:
+    """The controller ``controller``, writing a log of its exchanges, as a context manager; scene: from ``name_of``."""
     with path.open("wb") as file:
-        file.write(TITLE + scene.encode() + b"\n")
-        yield Logged(inner, file)
+        file.write(LOG_TITLE + scene.encode() + b"\n")
+        yield LoggedController(inner, file)
 
 
-def refusal(path: Path) -> str:
+def log_refusal(path: Path) -> str:
     """Why no log can be written to a path, or "" if one can. An older log is overwritten, any other file is not."""
     if path.is_dir():
         return "is a folder: name a file"
@@ -56,7 +56,7 @@ def refusal(path: Path) -> str:
     if not path.exists():
         return ""
     with path.open("rb") as file:
-        known = file.read(len(TITLE)) == TITLE
+        known = file.read(len(LOG_TITLE)) == LOG_TITLE
     return "" if known else "is a file that is no log, and would be overwritten: name another one"
 
 
@@ -69,7 +69,7 @@ class Replay:
             title, name, records = (path.read_bytes() + b"\n\n").split(b"\n", 2)
         except OSError as error:
             raise InputError(path.name, "replay", None, f"cannot be read: {error.strerror}") from None
-        if title + b"\n" != TITLE:
+        if title + b"\n" != LOG_TITLE:
             raise InputError(path.name, "replay", None, "is no log of the port, or of another version of it")
         if name != scene.encode():
             raise InputError(path.name, "replay", None, "is the log of another scene")
@@ -78,10 +78,10 @@ class Replay:
     def sample(self, sample: Sample) -> Command:
         """The logged answer to a sample; raises RunFailed if the log has ended, or if its question differs from this
         one."""
-        start = sample.number * RECORD
-        record, place = self._records[start : start + RECORD], f"sample {sample.number}: {self._path.name}"
-        if len(record) < RECORD:
+        start = sample.number * RECORD_LENGTH
+        record, place = self._records[start : start + RECORD_LENGTH], f"sample {sample.number}: {self._path.name}"
+        if len(record) < RECORD_LENGTH:
             raise RunFailed("replay", f"{place} has ended", 1e-9 * sample.time)
-        if record[: QUESTION.size] != question(sample):
+        if record[: QUESTION_LAYOUT.size] != question_frame(sample):
             raise RunFailed("replay", f"{place} was asked something else", 1e-9 * sample.time)
-        return command(record[QUESTION.size :], sample.number)
+        return command_of_answer(record[QUESTION_LAYOUT.size :], sample.number)

@@ -14,7 +14,7 @@ class WallClock:
     longest time (s) by which one was late.
     """
 
-    inner: Controller
+    controller: Controller
     period: float
     overruns: int = 0
     worst: float = 0.0
@@ -29,7 +29,7 @@ class WallClock:
         due = self._start + 1e-9 * sample.time
         if now < due:
             time.sleep(due - now)
-        command = self.inner.sample(sample)
+        command = self.controller.sample(sample)
         late = time.perf_counter() - (due + self.period)
         if late > 0.0:
             self.overruns, self.worst = self.overruns + 1, max(self.worst, late)

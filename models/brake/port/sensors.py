@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from models.brake.controller import Command, Controller, Sample
 from models.brake.port.teeth import Counted
-from models.core.noise import BLOCK, BRAKE_PRESSURES, BRAKE_SIGNALS, normal
+from models.core.noise import BRAKE_PRESSURES, BRAKE_SIGNALS, SAMPLES_PER_BLOCK, normal_samples
 from models.core.strict import Strict, quantity
 
 
@@ -55,37 +55,41 @@ class Channels:
 
     def _drawn(self, number: int) -> np.ndarray:
         """Standard normal numbers (count,) for a sample's noise, taken from the block of numbers that contains them."""
-        block, place = divmod(number, BLOCK)
+        block, place = divmod(number, SAMPLES_PER_BLOCK)
         if block != self._block:
-            first = block * BLOCK
+            first = block * SAMPLES_PER_BLOCK
             self._block = block
-            self._noise = normal(self.conversion.seed, 0, BLOCK, self._count, first, self._source)
+            self._noise = normal_samples(self.conversion.seed, 0, SAMPLES_PER_BLOCK, self._count, first, self._source)
         return self._noise[place]
 
 
 @dataclass
-class Sensed:
+class SensedController:
     """A controller that receives wheel speeds through sensors, and whose pressures are measured; a new one is made for
     every run.
 
-    teeth : counts the wheels' teeth first; None: their speed is known.
+    tooth_counter : counts the wheels' teeth first; None: their speed is known.
     """
 
-    inner: Controller
+    controller: Controller
     wheels: Channels
     pressures: Channels
-    teeth: Counted | None = None
+    tooth_counter: Counted | None = None
 
     def sample(self, sample: Sample) -> Command:
         """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
         zero."""
-        seen = sample.wheels if self.teeth is None else self.teeth(sample)
-        command = self.inner.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
+        seen = sample.wheels if self.tooth_counter is None else self.tooth_counter(sample)
+        command = self.controller.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
         if command.pressures is None:
             return command
         return Command(pressures=np.maximum(self.pressures(sample.number, np.asarray(command.pressures)), 0.0))
 
 
-def sensed(inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any) -> Sensed:
+def controller_behind_sensors(
+    inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any
+) -> SensedController:
     """A controller behind the sensors of W wheels."""
-    return Sensed(inner, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **more)
+    return SensedController(
+        inner, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **more
+    )

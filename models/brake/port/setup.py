@@ -14,18 +14,18 @@ from pydantic import Field, model_validator
 
 from models.brake.controller import Controller
 from models.brake.port import socket_port
-from models.brake.port.ask import STATES, STATES_WITH_SLOW_APPLY, CheckedController
-from models.brake.port.faults import Fault, Faulty, missing_teeth
-from models.brake.port.host import Guest
-from models.brake.port.hosted import hosted
-from models.brake.port.log import Replay, logged, name_of, refusal
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, CheckedController
+from models.brake.port.faults import Fault, FaultyController, missing_teeth
+from models.brake.port.host import HostedController
+from models.brake.port.hosted import controller_in_process
+from models.brake.port.log import Replay, log_refusal, logged_controller, name_of
 from models.brake.port.pace import WallClock
-from models.brake.port.sensors import Conversion, sensed
+from models.brake.port.sensors import Conversion, controller_behind_sensors
 from models.brake.port.teeth import Counted, Teeth
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
 
-BEHIND = ("callable", "command", "port", "fmu", "replay")
+PORT_KEYS = ("callable", "command", "port", "fmu", "replay")
 """What can stand behind the port in place of a controller of the scene; at most one does."""
 BY_HAND = 20.0
 """s for a process that somebody starts by hand to connect to a port, where the scene does not say."""
@@ -63,9 +63,9 @@ class PortTable(Strict):
 
     @model_validator(mode="after")
     def _one_behind(self) -> "PortTable":
-        named = [key for key in BEHIND if getattr(self, key) is not None]
+        named = [key for key in PORT_KEYS if getattr(self, key) is not None]
         if len(named) > 1:
-            raise ValueError(f"at most one of {', '.join(BEHIND)} can be there, not {' and '.join(named)}")
+            raise ValueError(f"at most one of {', '.join(PORT_KEYS)} can be there, not {' and '.join(named)}")
         if self.parameters and self.callable is None:
             raise ValueError("parameters has no meaning without callable")
         if self.teeth is None and any(fault.kind == "tooth" for fault in self.faults):
@@ -94,7 +94,7 @@ class ControllerRun:
 
 
 @contextmanager
-def opened(
+def controller_of_run(
     table: PortTable, run: ControllerRun, controller: Controller
 ) -> Iterator[tuple[Controller, WallClock | None]]:
     """The controller of one run as a context manager, and its wall clock if it is paced by one.
@@ -105,17 +105,20 @@ def opened(
     with ExitStack() as stack:
         inner = CheckedController(
             stack.enter_context(_possible_controllers(table, run, controller)),
-            STATES_WITH_SLOW_APPLY if run.slow else STATES,
+            STATES_WITH_SLOW_APPLY if run.slow else VALVE_STATES,
         )
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
-            watched = stack.enter_context(logged(watched, run.path(table.log), name_of(run.scene)))
-        faulty = Faulty(watched, table.faults) if table.faults else watched
+            watched = stack.enter_context(logged_controller(watched, run.path(table.log), name_of(run.scene)))
+        faulty = FaultyController(watched, table.faults) if table.faults else watched
         teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
         plain = teeth is None and table.signals == table.pressures == Conversion()
         wheels = run.radius.size
-        yield faulty if plain else sensed(faulty, wheels, table.signals, table.pressures, teeth=teeth), clock
+        yield (
+            faulty if plain else controller_behind_sensors(faulty, wheels, table.signals, table.pressures, teeth=teeth),
+            clock,
+        )
 
 
 @contextmanager
@@ -125,7 +128,9 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
             with _told_of_scene(table, run):
-                link = socket_port.connected(table.command, table.port or 0, table.timeout, table.patience, run.folder)
+                link = socket_port.controller_behind_socket(
+                    table.command, table.port or 0, table.timeout, table.patience, run.folder
+                )
                 entered = stack.enter_context(link)
             yield entered
         elif table.replay is not None:
@@ -135,9 +140,11 @@ def _possible_controllers(table: PortTable, run: ControllerRun, controller: Cont
         elif table.callable is not None or table.fmu is not None:
             folder = run.folder if table.fmu is None else Path(stack.enter_context(TemporaryDirectory()))
             fmu = None if table.fmu is None else run.path(table.fmu).absolute()
-            guest = Guest(table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file)
+            guest = HostedController(
+                table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file
+            )
             with _told_of_scene(table, run):
-                made = stack.enter_context(hosted(guest, table.timeout, table.patience))
+                made = stack.enter_context(controller_in_process(guest, table.timeout, table.patience))
             yield made
         else:
             yield controller
@@ -150,7 +157,7 @@ def _told_of_scene(table: PortTable, run: ControllerRun) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.place not in BEHIND:
+        if error.place not in PORT_KEYS:
             raise
         raise InputError(run.file, f"port.{error.place}", getattr(table, error.place), error.allowed) from None
 
@@ -163,7 +170,7 @@ def check_port(table: PortTable, run: ControllerRun) -> None:
             raise InputError(run.file, f"port.{key}", name, f"no such file, looked for as {str(run.path(name))!r}")
     if table.fmu is not None and find_spec("fmpy") is None:
         raise InputError(run.file, "port.fmu", table.fmu, "needs fmpy: pip install 'twinrig[fmi]'")
-    reason = "" if table.log is None else refusal(run.path(table.log))
+    reason = "" if table.log is None else log_refusal(run.path(table.log))
     if reason:
         raise InputError(run.file, "port.log", table.log, reason)
     wheels = run.radius.size

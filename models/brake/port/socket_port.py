@@ -12,16 +12,16 @@ from pathlib import Path
 
 from models.brake.controller import Command, Sample
 from models.brake.port.ask import ControllerFailed
-from models.brake.port.frame import ANSWER, WrongFrame, command, question
+from models.brake.port.frame import ANSWER_LAYOUT, WrongFrame, command_of_answer, question_frame
 from models.core.errors import InputError, RunFailed
 
-LOOPBACK = "127.0.0.1"
+LOOPBACK_ADDRESS = "127.0.0.1"
 """The only address that this port ever listens on."""
-STDERR = 2
+STANDARD_ERROR = 2
 """Where a controller's own prints go: standard output is for the results alone."""
 START_REMEDY = "if it needs longer, give start (s) under [port]"
 """Remedy where a controller is not there in time."""
-GRACE = 0.5
+GRACE_SECONDS = 0.5
 """Seconds for a process to end by itself once its connection is closed at the end of a run."""
 
 
@@ -41,23 +41,25 @@ class SocketPort:
         end = time.perf_counter() + self.timeout
         try:
             self.link.settimeout(self.timeout)
-            self.link.sendall(question(sample))
-            return command(self._frame(sample, end), sample.number)
+            self.link.sendall(question_frame(sample))
+            return command_of_answer(self._frame(sample, end), sample.number)
         except WrongFrame as error:
             raise ControllerFailed(sample, error.name, str(error)) from None
         except TimeoutError:
             raise ControllerFailed(sample, "silence", f"it does not read within {self.timeout:g} s") from None
         except OSError as error:
             raise ControllerFailed(
-                sample, "crash", f"the connection broke: {error.strerror or error}{fate(self.process, self.timeout)}"
+                sample,
+                "crash",
+                f"the connection broke: {error.strerror or error}{end_of_process(self.process, self.timeout)}",
             ) from None
 
     def _frame(self, sample: Sample, end: float) -> bytes:
         """Receive exactly one answer; further bytes would answer a question that has not been asked yet."""
         got = b""
-        while len(got) < ANSWER.size:
+        while len(got) < ANSWER_LAYOUT.size:
             try:
-                part = self.link.recv(ANSWER.size + 1 - len(got))
+                part = self.link.recv(ANSWER_LAYOUT.size + 1 - len(got))
             except TimeoutError:
                 part = None
             if part is None or time.perf_counter() > end:
@@ -66,43 +68,46 @@ class SocketPort:
                 raise ControllerFailed(
                     sample,
                     "crash",
-                    f"the connection was closed after {_received_bytes(got)}{fate(self.process, self.timeout)}",
+                    "the connection was closed after "
+                    f"{_received_bytes(got)}{end_of_process(self.process, self.timeout)}",
                 )
             got += part
-            if len(got) < ANSWER.size:
+            if len(got) < ANSWER_LAYOUT.size:
                 self.link.settimeout(max(end - time.perf_counter(), 1e-6))
-        if len(got) > ANSWER.size:
-            raise WrongFrame("wrong length", f"an answer of more than {ANSWER.size} bytes")
+        if len(got) > ANSWER_LAYOUT.size:
+            raise WrongFrame("wrong length", f"an answer of more than {ANSWER_LAYOUT.size} bytes")
         return got
 
 
-def fate(process: subprocess.Popen[bytes] | None, patience: float) -> str:
+def end_of_process(process: subprocess.Popen[bytes] | None, patience: float) -> str:
     """How a process with a closed connection ended, as a phrase; "" if it did not end within some seconds."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):
-        status = process.wait(min(patience, GRACE))
-        return f", its process ended with status {status}" if status >= 0 else f", its process got {_signal(-status)}"
+        status = process.wait(min(patience, GRACE_SECONDS))
+        return (
+            f", its process ended with status {status}" if status >= 0 else f", its process got {_signal_name(-status)}"
+        )
     return ""
 
 
-def _signal(number: int) -> str:
+def _signal_name(number: int) -> str:
     with suppress(ValueError):
         return signal.Signals(number).name
     return f"signal {number}"
 
 
 def _received_bytes(received: bytes) -> str:
-    return f"{len(received)} of {ANSWER.size} bytes" if received else "no answer"
+    return f"{len(received)} of {ANSWER_LAYOUT.size} bytes" if received else "no answer"
 
 
 @contextmanager
-def listening(address: int = 0) -> Iterator[socket.socket]:
+def listening_socket(address: int = 0) -> Iterator[socket.socket]:
     """A socket that waits for a controller at a port of this machine (0 for any free port); raises InputError."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            server.bind((LOOPBACK, address))
+            server.bind((LOOPBACK_ADDRESS, address))
         except OSError as error:
             raise InputError("", "port", address, f"cannot be listened on: {error.strerror}") from None
         server.listen(1)
@@ -110,7 +115,7 @@ def listening(address: int = 0) -> Iterator[socket.socket]:
 
 
 @contextmanager
-def connected(
+def controller_behind_socket(
     words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
 ) -> Iterator[SocketPort]:
     """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
@@ -119,14 +124,14 @@ def connected(
     else starts; start : seconds until it must have connected; folder : in which the command runs. However the block
     ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed where none connects.
     """
-    with listening(address) as server, _started(words, server.getsockname()[1], folder) as process:
-        link = _accepted(server, process, start)
+    with listening_socket(address) as server, _started_process(words, server.getsockname()[1], folder) as process:
+        link = _accepted_connection(server, process, start)
         with link:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             yield SocketPort(link, timeout, process)
 
 
-def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
+def _accepted_connection(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
     """The first connection to ``server`` within ``start`` seconds, while the process runs."""
     end = time.perf_counter() + start
     server.settimeout(min(0.05, start))
@@ -136,30 +141,32 @@ def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, st
         status = None if process is None else process.poll()
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
-    where = f"{LOOPBACK}:{server.getsockname()[1]}"
+    where = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
     raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {START_REMEDY}")
 
 
 @contextmanager
-def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[subprocess.Popen[bytes] | None]:
+def _started_process(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[subprocess.Popen[bytes] | None]:
     """The running process of a command, as a context manager that ends the process."""
     if words is None:
         yield None
         return
     said = [word.replace("{port}", str(port)) for word in words]
     try:
-        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STDERR, start_new_session=True)
+        process = subprocess.Popen(
+            said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
+        )
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
     grace = 0.0
     try:
         yield process
-        grace = GRACE
+        grace = GRACE_SECONDS
     finally:
-        _ended(process, grace)
+        _wait_for_end(process, grace)
 
 
-def _ended(process: subprocess.Popen[bytes], grace: float) -> None:
+def _wait_for_end(process: subprocess.Popen[bytes], grace: float) -> None:
     """Wait ``grace`` seconds for the process to end; then kill it and all processes that it started."""
     with suppress(subprocess.TimeoutExpired):
         process.wait(grace)

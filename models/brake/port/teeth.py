@@ -56,7 +56,7 @@ class Counted:
             if self._missing is None or not self._missing(i, k % self._teeth.teeth, time)
         ]
         if edges:
-            at = self._before + _instant((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
+            at = self._before + _time_of_distance((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
             at = math.floor(at / self._teeth.tick) * self._teeth.tick
             if wheel.edge is not None and at > wheel.edge:
                 wheel.shown = len(edges) * way / (at - wheel.edge)
@@ -74,7 +74,7 @@ class _Wheel:
         self.edge: float | None = None
 
 
-def _instant(distance: float, speed_before: float, speed_after: float, step: float) -> float:
+def _time_of_distance(distance: float, speed_before: float, speed_after: float, step: float) -> float:
     """Time (s) in which a distance is covered, while speed changes linearly between two values over a step."""
     slope = (speed_after - speed_before) / step
     root = math.sqrt(max(speed_before * speed_before + 2.0 * slope * distance, 0.0))

@@ -21,16 +21,16 @@ CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
     gravity.check,
     swapped.check,
     weight.check,
-    faults.levers,
-    faults.factors,
+    faults.lever_findings,
+    faults.factor_findings,
     drift.check,
-    faults.shifts,
+    faults.shift_findings,
     turning.check,
     rigid.check,
     noise.check,
 )
 """In this order: what an earlier one has named, a later one does not name again."""
-FAMILIES = defaultdict(
+SUBJECTS_OF_CHECK = defaultdict(
     frozenset[str],
     {
         **dict.fromkeys(("sign", "unit", "gain", "offset", "weight", "gravity", "lever"), frozenset({"size"})),
@@ -43,7 +43,7 @@ FAMILIES = defaultdict(
     },
 )
 """What the findings of a check are about: two of one kind about one channel say the same thing twice."""
-ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
+WEIGHT_ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
 
 
 def check(
@@ -57,22 +57,22 @@ def check(
     vehicle : None for one that is not in space; places : of accelerometers and gyros by name; claimed : white noise
     (SI) on every sample that is stated, by name of signal.
     """
-    return findings(Evidence(recording, vehicle, places or {}, claimed or {}))
+    return findings_of_all_checks(Evidence(recording, vehicle, places or {}, claimed or {}))
 
 
-def findings(evidence: Evidence) -> tuple[Finding, ...]:
+def findings_of_all_checks(evidence: Evidence) -> tuple[Finding, ...]:
     """Findings of all checks on a recording; the caller can use the same evidence for figures."""
     said = list(evidence.recording.noticed)
     for look in CHECKS:
         said += [finding for finding in look(evidence) if not _already_named(finding, said)]
-    return tuple(sorted(said, key=lambda finding: ORDER.index(finding.weight)))
+    return tuple(sorted(said, key=lambda finding: WEIGHT_ORDER.index(finding.weight)))
 
 
 def _already_named(finding: Finding, earlier_findings: list[Finding]) -> bool:
     """Whether an earlier finding, at least as severe, already explains the fault of one of this finding's channels."""
     return finding.weight != "note" and any(
-        ORDER.index(other.weight) <= ORDER.index(finding.weight)
-        and FAMILIES[other.check] & FAMILIES[finding.check]
+        WEIGHT_ORDER.index(other.weight) <= WEIGHT_ORDER.index(finding.weight)
+        and SUBJECTS_OF_CHECK[other.check] & SUBJECTS_OF_CHECK[finding.check]
         and set(other.signals) & set(finding.signals)
         for other in earlier_findings
     )

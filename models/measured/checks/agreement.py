@@ -21,7 +21,9 @@ VEHICLE_ERROR = 0.03
 """Share of an expected reading by which a vehicle file is taken to be wrong at the least: no one knows a car better."""
 LARGEST_DELAY, DELAY_SPACING = 0.25, 5e-4
 """s: delays looked at, and their spacing before the parabola through the best three."""
-TIMES = DELAY_SPACING * np.arange(-round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1)
+DELAYS_TRIED = DELAY_SPACING * np.arange(
+    -round(LARGEST_DELAY / DELAY_SPACING), round(LARGEST_DELAY / DELAY_SPACING) + 1
+)
 CHI_SQUARE_FALL = 40.0
 """Fall of chi square that one more parameter must bring: chance does so once in 10^9."""
 SMALL_DELAY, SMALL_FACTOR, SMALL_LEVER = 5e-4, 0.01, 0.01
@@ -30,10 +32,10 @@ EXPLAINED_SHARE = 0.35
 """Part of what is unexplained in some reading that a delay or factor must explain: springs that are 20 % stiffer than
 in the vehicle file, or dampers 30 % weaker, leave a sixth of the readings unexplained, and wrong delays explain up to
 a third of that."""
-FAULTS = 8
+MOST_FAULTS = 8
 """Faults looked for at the most."""
 SMALLEST_FLOAT = float(np.finfo(float).tiny)
-SMOOTHED = 9
+SMOOTHED_LINES = 9
 """Lines over which the unexplained spectrum is averaged."""
 
 
@@ -54,7 +56,8 @@ class MeasurementFault:
     the point to which moments refer.
 
     error : standard error of the size from random errors alone; for swapped and crossed, the unexplained share after
-    correction. fall : decrease of chi square. exchanged : hubs, each with the one whose channels it has.
+    correction. chi_square_fall : decrease of chi square. exchanged_hubs : hubs, each with the one whose channels it
+    has.
     """
 
     kind: Kind
@@ -62,8 +65,8 @@ class MeasurementFault:
     signals: tuple[Signal, ...]
     size: float
     error: float
-    fall: float
-    exchanged: tuple[tuple[str, str], ...] = ()
+    chi_square_fall: float
+    exchanged_hubs: tuple[tuple[str, str], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,8 +79,8 @@ class Agreement:
     """Measured cross spectra of forces and readings, compared with the vehicle's response, at frequencies (f,) in Hz.
 
     between (f, k, c) : mean of reading times conj(force); forces (f, c, c); readings (f, k) : powers. response
-    (f, k, c) : of the vehicle, with every correction so far. averages : independent ones in each mean. noise
-    (k,) : power of the readings' white noise in every line.
+    (f, k, c) : of the vehicle, with every correction so far. independent_averages : independent ones in each mean.
+    noise (k,) : power of the readings' white noise in every line.
     """
 
     frequencies: np.ndarray
@@ -87,7 +90,7 @@ class Agreement:
     between: np.ndarray
     readings: np.ndarray
     response: np.ndarray
-    averages: float
+    independent_averages: float
     noise: np.ndarray
 
     @cached_property
@@ -101,7 +104,7 @@ class Agreement:
         return {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
 
     @cached_property
-    def expected(self) -> np.ndarray:
+    def predicted_powers(self) -> np.ndarray:
         """Powers (f, k) of the readings that the forces predict."""
         return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
@@ -109,7 +112,7 @@ class Agreement:
     def left(self) -> np.ndarray:
         """Powers (f, k) of the residual: the measured readings less the prediction."""
         shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
-        return np.maximum(self.readings - 2 * shared + self.expected, 0.0)
+        return np.maximum(self.readings - 2 * shared + self.predicted_powers, 0.0)
 
     @property
     def unexplained(self) -> np.ndarray:
@@ -118,7 +121,7 @@ class Agreement:
         share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT)
         return np.sqrt(np.maximum(share, 0.0))
 
-    def typical(self) -> float:
+    def median_unexplained(self) -> float:
         """Median over the readings of the unexplained share."""
         return float(np.median(self.unexplained))
 
@@ -131,17 +134,17 @@ class Agreement:
     def weights(self) -> np.ndarray:
         """Weights of the frequencies: inverse of the smoothed unexplained power, so that a line that no force explains
         counts little."""
-        kernel = np.ones(SMOOTHED) / SMOOTHED
-        known = VEHICLE_ERROR**2 * np.maximum(self.expected, 1e-3 * self.expected.mean(axis=0))
-        padded = np.pad(self.left + known, ((SMOOTHED // 2, SMOOTHED // 2), (0, 0)), mode="edge")
+        kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
+        known = VEHICLE_ERROR**2 * np.maximum(self.predicted_powers, 1e-3 * self.predicted_powers.mean(axis=0))
+        padded = np.pad(self.left + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
-        return self.averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
+        return self.independent_averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
         now, faults = self, list[MeasurementFault]()
-        while len(faults) < FAULTS:
-            worst = max(now._explaining_faults(), key=lambda fault: fault.fall, default=None)
+        while len(faults) < MOST_FAULTS:
+            worst = max(now._explaining_faults(), key=lambda fault: fault.chi_square_fall, default=None)
             if worst is None:
                 break
             faults.append(worst)
@@ -153,14 +156,14 @@ class Agreement:
         the fault of a reading."""
         response = self.response.copy()
         if fault.kind == "swapped":
-            to = dict(fault.exchanged)
+            to = dict(fault.exchanged_hubs)
             order = [self.places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
             return replace(self, response=response[:, :, order])
         if fault.kind == "crossed":
-            return self._crossed(fault.signals)
+            return self._with_channels_exchanged(fault.signals)
         if fault.kind == "lever":
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
-            return replace(self, response=response + fault.size * self._levers(hubs))
+            return replace(self, response=response + fault.size * self._height_derivatives(hubs))
         turn = 2j * np.pi * self.frequencies
         wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
         forces, index = self._indices_of(fault.signals)
@@ -180,8 +183,8 @@ class Agreement:
             for fault in (*self._delay_faults(group, weights), *self._factor_faults(group, weights)):
                 if self._is_worth_correcting(self.without(fault), weights):
                     yield fault
-        yield from self._swapped(weights)
-        yield from self._pairs(weights)
+        yield from self._swapped_hub_faults(weights)
+        yield from self._exchanged_channel_faults(weights)
         yield from self._moment_point_faults(weights)
 
     def groups(self) -> Iterator[SignalGroup]:
@@ -208,7 +211,7 @@ class Agreement:
     @cached_property
     def _delay_factors(self) -> np.ndarray:
         """Phase factors exp(i omega t) (t, f) of all trial delays t."""
-        return np.exp(2j * np.pi * np.outer(TIMES, self.frequencies))
+        return np.exp(2j * np.pi * np.outer(DELAYS_TRIED, self.frequencies))
 
     def share(self, group: SignalGroup) -> tuple[np.ndarray, np.ndarray]:
         """Cross power (f, k) of the readings less all other predictions with the group's prediction; power (f, k) of
@@ -217,7 +220,7 @@ class Agreement:
         if group.forces:
             response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
             rest = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ among
-            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power(response, among)
+            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power_spectrum(response, among)
         cross, power = np.zeros((2, *self.readings.shape), complex)
         response = self.response[:, pick]
         cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
@@ -231,7 +234,7 @@ class Agreement:
         line = (weights * (cross.conj() if group.forces else cross)).sum(axis=1)
         likely = (self._delay_factors @ line).real
         best = int(np.argmax(likely[1:-1])) + 1
-        late = float(TIMES[best] + DELAY_SPACING * _vertex(*likely[best - 1 : best + 2]))
+        late = float(DELAYS_TRIED[best] + DELAY_SPACING * _parabola_vertex(*likely[best - 1 : best + 2]))
         turn = 2j * np.pi * self.frequencies
         fall = 2 * float((np.exp(turn * late) @ line - line.sum()).real)
         steep = 2 * float((np.abs(turn) ** 2 @ (weights * power)).sum())
@@ -258,18 +261,18 @@ class Agreement:
         """Faults of hub moments that refer to a point above or below the hub: at one hub, at two, or equally at all."""
         for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
-            levers = self._levers(some)
-            power = float((weights * _power(levers, self.forces)).sum())
+            levers = self._height_derivatives(some)
+            power = float((weights * _power_spectrum(levers, self.forces)).sum())
             if not power > 0:
                 continue
             rest = self.between - self._expected_times_forces
             size = float((weights * np.einsum("fkc,fkc->fk", rest, levers.conj()).real).sum()) / power
             fault = MeasurementFault("lever", " and ".join(some), signals, size, (2 * power) ** -0.5, power * size**2)
-            large = fault.fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
+            large = fault.chi_square_fall > CHI_SQUARE_FALL and abs(size) > max(SMALL_LEVER, 4 * fault.error)
             if large and self._is_worth_correcting(self.without(fault), weights):
                 yield fault
 
-    def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
+    def _height_derivatives(self, hubs: tuple[str, ...]) -> np.ndarray:
         """Change of the response (f, k, c) per m of height of the point about which hub moments are given.
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
@@ -282,43 +285,43 @@ class Agreement:
                     out[:, :, force] += sign * self.response[:, :, moment]
         return out
 
-    def _swapped(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _swapped_hub_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Faults in which hubs have exchanged their channels: two hubs, or two pairs of hubs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
         for exchanged in (*((pair,) for pair in pairs), *twice):
-            fault = self._exchange(exchanged)
+            fault = self._exchange_fault(exchanged)
             if fault is not None:
                 other = self.without(fault)
                 fall = before - float((weights * other.left).sum())
                 if fall > CHI_SQUARE_FALL and other.left.sum() < self.left.sum():
-                    yield replace(fault, size=self.rms, error=other.rms, fall=fall)
+                    yield replace(fault, size=self.rms, error=other.rms, chi_square_fall=fall)
 
-    def _pairs(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
+    def _exchanged_channel_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Pairs of channels whose signals may be exchanged with each other."""
-        for pair, other in self._exchanges():
+        for pair, other in self._channel_exchanges():
             fall = self._certain_improvement(other, weights)
             if fall:
                 yield MeasurementFault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
-    def blind(self) -> list[tuple[Signal, ...]]:
+    def undetectable_exchanges(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments along one axis whose exchange this recording could not reveal."""
-        alike = ((pair, other) for pair, other in self._exchanges() if len({s.component for s in pair}) == 1)
+        alike = ((pair, other) for pair, other in self._channel_exchanges() if len({s.component for s in pair}) == 1)
         return [
             pair
             for pair, other in alike
             if pair[0] in self.inputs and not other._certain_improvement(self, other.weights)
         ]
 
-    def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
+    def _channel_exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
         """Pairs of channels of one quantity with a common place or axis, each with the agreement after their
         exchange."""
         for side in (self.inputs, self.outputs):
             for pair in combinations(side, 2):
                 what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
                 if what == 1 and (at == 1 or axis == 1):
-                    yield pair, self._crossed(pair)
+                    yield pair, self._with_channels_exchanged(pair)
 
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this agreement to the corrected one; 0 if it is not significant, or too small to be
@@ -326,13 +329,13 @@ class Agreement:
         fall = float((weights * (self.left - corrected.left)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
-    def _crossed(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
+    def _with_channels_exchanged(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
         """The agreement with two channels exchanged; both are forces, or both are readings."""
         response = self.response.copy()
         response[self._indices_of(channel_pair)[1]] = self.response[self._indices_of(channel_pair[::-1])[1]]
         return replace(self, response=response)
 
-    def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
+    def _exchange_fault(self, exchanged: tuple[tuple[str, str], ...]) -> MeasurementFault | None:
         """The fault that describes exchanged pairs of hubs; None if the hubs have different channels."""
         both = tuple(way for a, b in exchanged for way in ((a, b), (b, a)))
         signals = tuple(s for s in self.inputs if s.at in dict(both))
@@ -343,7 +346,7 @@ class Agreement:
             "swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both
         )
 
-    def seen(self) -> dict[str, tuple[float, float]]:
+    def detectable_sizes(self) -> dict[str, tuple[float, float]]:
         """By signal name: the smallest delay (s) and the smallest error of the factor that the search would detect in
         that signal alone."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
@@ -390,11 +393,11 @@ def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) ->
     return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
 
 
-def _power(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _power_spectrum(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
 
 
-def _vertex(left: float, middle_value: float, right: float) -> float:
+def _parabola_vertex(left: float, middle_value: float, right: float) -> float:
     """Position of the vertex of the parabola through three values at -1, 0 and 1."""
     bend = left - 2 * middle_value + right
     return 0.5 * (left - right) / bend if bend < 0 else 0.0

@@ -4,41 +4,44 @@ import numpy as np
 
 from models.core.finding import Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.gaps import BRIDGED, true_runs
-from models.measured.signal import UNITS, Signal
+from models.measured.gaps import LONGEST_BRIDGED_GAP, true_runs
+from models.measured.signal import UNIT_OF_QUANTITY, Signal
 
 NAME = "clipped"
 FEWEST_EXTREME_SAMPLES = 6
 """Samples at the extreme value below which nothing is said."""
-PILE = 5
+PILE_RATIO = 5
 """Times as many as at the next value below it: the tail of a rounded channel has more of them farther in, not less."""
-STUCK = 0.02
-"""s: a channel that gives one value for longer stands still, if this is also USUAL times longer than is usual. What is
-not longer than a gap that would be bridged is a doubt."""
-USUAL = 20
-ROUNDED = 1e-9
+STUCK_DURATION = 0.02
+"""s: a channel that gives one value for longer stands still, if this is also USUAL_STUCK_FACTOR times longer than is
+usual. What is not longer than a gap that would be bridged is a doubt."""
+USUAL_STUCK_FACTOR = 20
+ROUNDED_SHARE = 1e-9
 """Of the largest value of its quantity: a channel that changes by less holds rounding and no measurement."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
     """Findings on channels that are clipped or keep one value. Sizes are shares of samples in %, or for a constant
     value its duration in s."""
-    findings = [finding for signal in evidence.recording.signals for finding in _signal(evidence, signal)]
+    findings = [finding for signal in evidence.recording.signals for finding in _signal_findings(evidence, signal)]
     return findings or [Finding(NAME, "note", "", "No channel is clipped or stands still.")]
 
 
-def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
+def _signal_findings(evidence: Evidence, signal: Signal) -> list[Finding]:
     values, period = evidence.recording.samples(signal), evidence.recording.period
     good = values[np.isfinite(values)]
     if len(good) and good.min() == good.max():
         text = (
-            f"{signal.name} reads {good[0]:.4g} {UNITS[signal.quantity]} from beginning to end: it is dead, or the "
+            f"{signal.name} reads {good[0]:.4g} {UNIT_OF_QUANTITY[signal.quantity]} from beginning to "
+            "end: it is dead, or the "
             "map names another channel. Leave it out or name the right one."
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
-    measured = len(good) and np.ptp(good) > ROUNDED * _largest_of_quantity(evidence, signal)
-    findings = [_clipped(signal, values, good, end, period) for end in clipping_extremes(values)] if measured else []
-    return findings or _stuck(signal, values, period)
+    measured = len(good) and np.ptp(good) > ROUNDED_SHARE * _largest_of_quantity(evidence, signal)
+    findings = (
+        [_clipped_finding(signal, values, good, end, period) for end in clipping_extremes(values)] if measured else []
+    )
+    return findings or _stuck_findings(signal, values, period)
 
 
 def _largest_of_quantity(evidence: Evidence, signal: Signal) -> float:
@@ -53,23 +56,24 @@ def clipping_extremes(values: np.ndarray) -> list[float]:
     good = values[np.isfinite(values)]
     if not len(good) or good.min() == good.max():
         return []
-    return [float(end) for end in (good.min(), good.max()) if _piled(values, good, end)]
+    return [float(end) for end in (good.min(), good.max()) if _is_piled(values, good, end)]
 
 
-def _piled(values: np.ndarray, valid: np.ndarray, end: float) -> bool:
+def _is_piled(values: np.ndarray, valid: np.ndarray, end: float) -> bool:
     at, others = int(np.count_nonzero(valid == end)), valid[valid != end]
     next_to = others[np.argmin(np.abs(others - end))]
-    if at < FEWEST_EXTREME_SAMPLES or at < PILE * np.count_nonzero(valid == next_to):
+    if at < FEWEST_EXTREME_SAMPLES or at < PILE_RATIO * np.count_nonzero(valid == next_to):
         return False
     runs_at_limit = true_runs(values == end)
     return bool(np.max(runs_at_limit[:, 1] - runs_at_limit[:, 0]) >= 2)
 
 
-def _clipped(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, period: float) -> Finding:
+def _clipped_finding(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, period: float) -> Finding:
     at, clipped_runs = int(np.count_nonzero(valid == end)), true_runs(values == end)
     share, first = 100 * at / len(valid), float(period * clipped_runs[0, 0])
     text = (
-        f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(clipped_runs)} runs, "
+        f"{signal.name} is clipped at {end:.5g} {UNIT_OF_QUANTITY[signal.quantity]}: {at} samples in "
+        f"{len(clipped_runs)} runs, "
         f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "
         "small: measure again with a wider range, or leave these times out."
     )
@@ -78,20 +82,20 @@ def _clipped(signal: Signal, values: np.ndarray, valid: np.ndarray, end: float, 
     )
 
 
-def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
+def _stuck_findings(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
     """Finding on the longest time for which a channel keeps one value, though it changes otherwise."""
     same = true_runs(np.diff(values) == 0)
     if not len(same):
         return []
     longest = int(np.argmax(same[:, 1] - same[:, 0]))
     usual = len(values) / (1 + np.count_nonzero(np.diff(values)))
-    if same[longest, 1] - same[longest, 0] < max(STUCK / period, USUAL * usual):
+    if same[longest, 1] - same[longest, 0] < max(STUCK_DURATION / period, USUAL_STUCK_FACTOR * usual):
         return []
     first, end = (float(period * i) for i in same[longest])
-    held = f"{values[same[longest, 0]]:.5g} {UNITS[signal.quantity]}"
+    held = f"{values[same[longest, 0]]:.5g} {UNIT_OF_QUANTITY[signal.quantity]}"
     text = (
         f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
         "held over a gap; leave these times out."
     )
-    weight: Weight = "doubt" if signal.check or end - first <= BRIDGED else "error"
+    weight: Weight = "doubt" if signal.check or end - first <= LONGEST_BRIDGED_GAP else "error"
     return [Finding(NAME, weight, signal.name, text, end - first, "s", (signal.name,), (first, end))]

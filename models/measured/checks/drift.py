@@ -7,10 +7,10 @@ import numpy as np
 from models.core.finding import Finding
 from models.measured.checks.agreement import Agreement, SignalGroup
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import SEGMENT, spectra
+from models.measured.checks.spectra import SEGMENT_LENGTH, cross_spectra
 
 NAME = "drift"
-WINDOW, MOST_WINDOWS = SEGMENT, 30
+WINDOW_LENGTH, MOST_WINDOWS = SEGMENT_LENGTH, 30
 """s over which a delay is taken, in halves that overlap; windows at the most, spread evenly."""
 FEWEST_WINDOWS = 3
 """Windows that a slope needs."""
@@ -27,27 +27,29 @@ def check(evidence: Evidence) -> list[Finding]:
     others = dict.fromkeys(s.file for s in evidence.inertial if s.file not in clocks)
     if not others:
         return []
-    windows = _windows(evidence) if evidence.searched and len(clocks) == 1 else []
+    windows = _agreement_by_window(evidence) if evidence.agreement_and_faults and len(clocks) == 1 else []
     needed = (
         "was not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
-        f"{FEWEST_WINDOWS} stretches of {WINDOW:g} s without a gap."
+        f"{FEWEST_WINDOWS} stretches of {WINDOW_LENGTH:g} s without a gap."
     )
     if len(windows) < FEWEST_WINDOWS:
         what = "runs as fast as that of the hub forces"
         return [Finding(NAME, "note", name, f"Whether the clock of {name} {what} {needed}") for name in others]
-    return [_finding(evidence, windows, name, min(clocks)) for name in others]
+    return [_drift_finding(evidence, windows, name, min(clocks)) for name in others]
 
 
-def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
+def _agreement_by_window(evidence: Evidence) -> list[tuple[float, Agreement]]:
     """Middle (s) and ``Agreement`` of parts of the recording, each with the corrections found from the whole
     recording."""
-    assert evidence.searched is not None
-    now, recording = evidence.searched[0], evidence.recording
-    length = round(WINDOW / recording.period)
+    assert evidence.agreement_and_faults is not None
+    now, recording = evidence.agreement_and_faults[0], evidence.recording
+    length = round(WINDOW_LENGTH / recording.period)
     firsts = np.linspace(0, recording.count - length, max(min(recording.count // length, MOST_WINDOWS), 1)).astype(int)
     windows, c = [], len(now.inputs)
     for first in firsts if recording.count >= length else ():
-        part = spectra(recording, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
+        part = cross_spectra(
+            recording, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length)
+        )
         if part is not None:
             lines = np.abs(now.frequencies[:, None] - part.frequencies).argmin(axis=0)
             local = replace(
@@ -57,17 +59,17 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
                 between=part.cross[:, c:, :c],
                 readings=np.einsum("fkk->fk", part.cross[:, c:, c:]).real,
                 response=now.response[lines],
-                averages=part.averages,
+                independent_averages=part.independent_averages,
             )
             windows.append(((first + length / 2) * recording.period, local))
     return windows
 
 
-def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
+def _drift_finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
     of_file = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
     signals = tuple(s.name for s in evidence.inertial if s.file == name)
     late = np.array([part.delay_of(SignalGroup(name, False, of_file), part.weights)[:2] for _, part in windows])
-    slope, error = _slope(np.array([at for at, _ in windows]), *late.T)
+    slope, error = _slope_of_delays(np.array([at for at, _ in windows]), *late.T)
     apart = slope * evidence.recording.duration
     if abs(slope) > SLOPE_STANDARD_ERRORS * error and abs(apart) > LEAST_CLOCK_DRIFT:
         word = "fast" if slope > 0 else "slow"
@@ -84,7 +86,7 @@ def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: s
     return Finding(NAME, "note", name, text, slope, "1", signals)
 
 
-def _slope(times: np.ndarray, late: np.ndarray, errors: np.ndarray) -> tuple[float, float]:
+def _slope_of_delays(times: np.ndarray, late: np.ndarray, errors: np.ndarray) -> tuple[float, float]:
     """Slope of delays (n,) over time and its standard error, from the delays' own errors or from their scatter,
     whichever is larger."""
     weights = 1 / errors**2

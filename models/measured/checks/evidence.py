@@ -7,25 +7,25 @@ from functools import cached_property, partial
 import numpy as np
 
 from models.measured.checks.agreement import Agreement, MeasurementFault
-from models.measured.checks.response import AXES, SensorResponse, number
-from models.measured.checks.spectra import Spectra, noise, spectra, windowed_means
+from models.measured.checks.response import AXIS_INDEX, SensorResponse, component_index
+from models.measured.checks.spectra import Spectra, cross_spectra, noise, windowed_means
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
-BAND = 1.0, 25.0
+COMPARED_BAND = 1.0, 25.0
 """Hz: above the drift of a free vehicle, below the bending of its body."""
 LEAST_MEAN_SHARE = 5e-4
 """Of a static load or of gravity: a mean that is smaller says nothing of unit and sign."""
-INERTIAL = ("acceleration", "angular rate", "angle")
+INERTIAL_QUANTITIES = ("acceleration", "angular rate", "angle")
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Data on which the checks work. places : of accelerometers and gyros by name; claimed : stated white noise (SI),
-    by name of signal.
+    """Data on which the checks work. places : of accelerometers and gyros by name; stated_noise : stated white noise
+    (SI), by name of signal.
 
     plane : parameters of the pitch-plane vehicle, if the recording drives one instead of a vehicle in space.
     """
@@ -33,7 +33,7 @@ class Evidence:
     recording: Recording
     vehicle: CutVehicle | None
     places: Mapping[str, TransducerPlace] = field(default_factory=dict)
-    claimed: Mapping[str, float] = field(default_factory=dict)
+    stated_noise: Mapping[str, float] = field(default_factory=dict)
     plane: Parameters | None = None
 
     @cached_property
@@ -46,7 +46,7 @@ class Evidence:
     @cached_property
     def inertial(self) -> tuple[Signal, ...]:
         """Accelerations, angular rates and angles measured at a known place on the vehicle."""
-        moving = [s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES]
+        moving = [s for s in self.recording.signals if s.quantity in INERTIAL_QUANTITIES and s.component in AXIS_INDEX]
         return tuple(s for s in moving if self.place(s) is not None)
 
     def vertical(self) -> dict[str, Signal]:
@@ -63,7 +63,7 @@ class Evidence:
         return TransducerPlace(body.name, body.position) if body else None
 
     @cached_property
-    def lacking(self) -> str:
+    def missing_data_text(self) -> str:
         """Text on which data are missing for comparing forces with motion; empty if none is."""
         if self.vehicle is None:
             return "a vehicle in space"
@@ -84,7 +84,7 @@ class Evidence:
         return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
-    def coarse(self) -> dict[Signal, float]:
+    def coarse_factors(self) -> dict[Signal, float]:
         """Ratio of recorded to true value for signals whose mean alone shows a wrong sign or unit.
 
         Means of vertical forces are compared with static loads, and those of vertical accelerometers with gravity.
@@ -108,21 +108,23 @@ class Evidence:
 
     @cached_property
     def _spectra(self) -> Spectra | None:
-        top = min(BAND[1], 0.4 / self.recording.period)
-        return spectra(self.recording, (*self.forces, *self.inertial), (BAND[0], top))
+        top = min(COMPARED_BAND[1], 0.4 / self.recording.period)
+        return cross_spectra(self.recording, (*self.forces, *self.inertial), (COMPARED_BAND[0], top))
 
     @cached_property
     def agreement(self) -> Agreement | None:
         """Comparison of recorded forces and motion, after correcting signs and units that means show; None where data
         are lacking."""
-        if self.lacking:
+        if self.missing_data_text:
             return None
         assert self.vehicle is not None and self._spectra is not None
         measured_spectra, c = self._spectra, len(self.forces)
         places = [place for s in self.inertial if (place := self.place(s)) is not None]
         response = SensorResponse(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
-        numbers = [number(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
-        forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
+        numbers = [component_index(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
+        forces, felt = (
+            np.array([self.coarse_factors.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial)
+        )
         return Agreement(
             measured_spectra.frequencies,
             self.forces,
@@ -131,8 +133,8 @@ class Evidence:
             measured_spectra.cross[:, c:, :c],
             np.einsum("fkk->fk", measured_spectra.cross[:, c:, c:]).real,
             response[:, :, numbers] / forces * felt[:, None],
-            measured_spectra.averages,
-            measured_spectra.white * np.square([noise(self.recording, s) for s in self.inertial]),
+            measured_spectra.independent_averages,
+            measured_spectra.white_noise_power * np.square([noise(self.recording, s) for s in self.inertial]),
         )
 
     @property
@@ -141,25 +143,25 @@ class Evidence:
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property
-    def searched(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
+    def agreement_and_faults(self) -> tuple[Agreement, tuple[MeasurementFault, ...]] | None:
         """The agreement after correction of its faults, and these faults, the worst one first."""
         return self.agreement.search() if self.agreement else None
 
     @property
     def faults(self) -> tuple[MeasurementFault, ...]:
         """Faults found by comparing forces with motion; empty if they cannot be compared."""
-        return self.searched[1] if self.searched else ()
+        return self.agreement_and_faults[1] if self.agreement_and_faults else ()
 
     @cached_property
-    def seen(self) -> dict[str, tuple[float, float]]:
+    def detectable_sizes(self) -> dict[str, tuple[float, float]]:
         """By signal name: smallest detectable delay (s) and error of the factor; empty if nothing could be compared."""
-        return self.searched[0].seen() if self.searched else {}
+        return self.agreement_and_faults[0].detectable_sizes() if self.agreement_and_faults else {}
 
     def hub(self, signal: Signal) -> str:
         """Hub at which a force acts after exchanged hubs are corrected."""
         for fault in self.faults:
-            if fault.kind == "swapped" and signal.at in dict(fault.exchanged):
-                return dict(fault.exchanged)[signal.at]
+            if fault.kind == "swapped" and signal.at in dict(fault.exchanged_hubs):
+                return dict(fault.exchanged_hubs)[signal.at]
             if fault.kind == "crossed" and signal in fault.signals:
                 return next(s.at for s in fault.signals if s != signal)
         return signal.at

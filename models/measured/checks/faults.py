@@ -8,57 +8,59 @@ about the contact patch, or a plane of the transducer.
 from models.core.finding import Finding, Weight
 from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spikes import spikes
-from models.measured.ratios import sentence
+from models.measured.checks.spikes import spike_positions
+from models.measured.ratios import cause_and_sentence
 
 FACTOR_ERRORS = 0.02, 0.1
 """Errors of a factor of which it is said in how many channels they would be seen."""
-SHIFT = 3e-3
+UNCHECKED_SHIFT = 3e-3
 """s: a channel in which less would not be seen is named as not checked."""
-PATCH = 0.2, 0.6
+WHEEL_RADIUS_RANGE = 0.2, 0.6
 """m: radii of wheels; a lever of this size is one of them."""
 
 
-def factors(evidence: Evidence) -> list[Finding]:
+def factor_findings(evidence: Evidence) -> list[Finding]:
     """Findings on wrong factors. Sizes are shares in %, or the ratio of recorded to true value where sign or unit is
     wrong. A finding is only a doubt where a spike may be the cause."""
-    if evidence.lacking:
+    if evidence.missing_data_text:
         what = "Signs, units and factors were not checked by the motion of the vehicle"
-        return [Finding("factor", "note", "", f"{what}: this needs {evidence.lacking}.")]
-    findings = [_factor(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
-    least = [wrong for _, wrong in evidence.seen.values()]
+        return [Finding("factor", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
+    findings = [_factor_finding(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
+    least = [wrong for _, wrong in evidence.detectable_sizes.values()]
     parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in FACTOR_ERRORS)
     text = f"A factor that is wrong {parts} of {len(least)} channels would be seen by the motion."
     return [*findings, Finding("gain", "note", "", text)]
 
 
-def _factor(evidence: Evidence, fault: MeasurementFault) -> Finding:
-    kind, text = sentence(fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell")
+def _factor_finding(evidence: Evidence, fault: MeasurementFault) -> Finding:
+    kind, text = cause_and_sentence(
+        fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell"
+    )
     if len(fault.signals) > 1:
         text = f"{fault.name[0].upper()}{fault.name[1:]} are wrong alike: {text}"
     if kind in ("gain", "size"):
         text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
         return Finding("gain", "doubt", fault.name, text, 100 * (fault.size - 1), "%", fault.names)
-    spiky = any(len(spikes(evidence.recording.samples(s))[0]) for s in fault.signals)
+    spiky = any(len(spike_positions(evidence.recording.samples(s))[0]) for s in fault.signals)
     weight: Weight = "doubt" if spiky else "error"
     return Finding(kind, weight, fault.name, text, fault.size, "1", fault.names)
 
 
-def shifts(evidence: Evidence) -> list[Finding]:
+def shift_findings(evidence: Evidence) -> list[Finding]:
     """Findings on time shifts, from the motion that the hub forces predict. Sizes are in s, positive where a channel is
     late."""
     if evidence.agreement is None:
         what = "Shifts in time were not checked by the motion of the vehicle"
-        return [Finding("shift", "note", "", f"{what}: this needs {evidence.lacking}.")]
-    findings = [_shift(fault) for fault in evidence.faults if fault.kind == "late"]
-    blind = [name for name, (late, _) in evidence.seen.items() if not late < SHIFT]
-    seen = f"{len(evidence.seen) - len(blind)} of {len(evidence.seen)}"
-    text = f"A shift of {1e3 * SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
+        return [Finding("shift", "note", "", f"{what}: this needs {evidence.missing_data_text}.")]
+    findings = [_shift_finding(fault) for fault in evidence.faults if fault.kind == "late"]
+    blind = [name for name, (late, _) in evidence.detectable_sizes.items() if not late < UNCHECKED_SHIFT]
+    seen = f"{len(evidence.detectable_sizes) - len(blind)} of {len(evidence.detectable_sizes)}"
+    text = f"A shift of {1e3 * UNCHECKED_SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
     text += f"; too little of it comes from {', '.join(blind)}." if blind else "."
     return [*findings, Finding("shift", "note", "", text)]
 
 
-def _shift(fault: MeasurementFault) -> Finding:
+def _shift_finding(fault: MeasurementFault) -> Finding:
     late, single = "late" if fault.size > 0 else "early", len(fault.signals) == 1
     subject = f"{fault.name} is" if single else f"{fault.name[0].upper()}{fault.name[1:]} are"
     text = (
@@ -69,16 +71,16 @@ def _shift(fault: MeasurementFault) -> Finding:
     return Finding("shift", "doubt", fault.name, text, fault.size, "s", fault.names)
 
 
-def levers(evidence: Evidence) -> list[Finding]:
+def lever_findings(evidence: Evidence) -> list[Finding]:
     """Findings on hub moments that refer to another point than the hub, from the motion that the hub forces predict.
     Sizes are the point's height above the hub, m."""
-    return [_lever(fault) for fault in evidence.faults if fault.kind == "lever"]
+    return [_lever_finding(fault) for fault in evidence.faults if fault.kind == "lever"]
 
 
-def _lever(fault: MeasurementFault) -> Finding:
+def _lever_finding(fault: MeasurementFault) -> Finding:
     hubs = tuple(dict.fromkeys(signal.at for signal in fault.signals))
     length, side, wheel = abs(fault.size), "above" if fault.size > 0 else "below", ""
-    if PATCH[0] < length < PATCH[1]:
+    if WHEEL_RADIUS_RANGE[0] < length < WHEEL_RADIUS_RANGE[1]:
         wheel = (
             ", a wheel's radius: they are about the contact patch"
             if fault.size < 0

@@ -4,7 +4,7 @@ import numpy as np
 
 from models.core.finding import LISTED_FINDINGS, Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.gaps import BRIDGED, true_runs
+from models.measured.gaps import LONGEST_BRIDGED_GAP, true_runs
 from models.measured.signal import Signal
 
 NAME = "gaps"
@@ -21,19 +21,19 @@ def check(evidence: Evidence) -> list[Finding]:
             sets.setdefault(lost, []).append(signal)
     if not sets:
         return [Finding(NAME, "note", "", f"No sample of any of the {len(recording.signals)} channels is missing.")]
-    return [_finding(evidence, np.array(lost), tuple(signals)) for lost, signals in sets.items()]
+    return [_gap_finding(evidence, np.array(lost), tuple(signals)) for lost, signals in sets.items()]
 
 
-def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) -> Finding:
+def _gap_finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) -> Finding:
     period, lengths, names = evidence.recording.period, lost[:, 1] - lost[:, 0], tuple(s.name for s in signals)
     longest = int(np.argmax(lengths))
     first, end, lasts = (float(period * samples) for samples in (*lost[longest], lengths[longest]))
     driving = any(s.quantity in ("force", "moment") and not s.check for s in signals)
-    stops = driving and lengths[longest] * period > BRIDGED
+    stops = driving and lengths[longest] * period > LONGEST_BRIDGED_GAP
     remedy = (
         "leave it out with [clock] start and duration, for no run can go on without hub forces"
         if stops
-        else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles"
+        else f"up to {LONGEST_BRIDGED_GAP:g} s are bridged in hub forces, and the filter goes on without angles"
     )
     short = ", ".join(names) if len(names) <= LISTED_FINDINGS else f"{len(names)} channels, {names[0]} to {names[-1]}"
     text = f"{short}: {lasts:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"

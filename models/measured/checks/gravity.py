@@ -2,14 +2,14 @@
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.ratios import sentence
+from models.measured.ratios import cause_and_sentence
 from models.measured.signal import Signal
 from models.vehicles.cut_vehicle import GRAVITY
 
 NAME = "gravity"
-BIAS = 0.5
+VERTICAL_BIAS = 0.5
 """m/s^2 by which a vertical mean may be off before it is named: a car on a grade of 20 % loses 0.2."""
-LEVEL = 3.0
+HORIZONTAL_MEAN_LIMIT = 3.0
 """m/s^2 that a horizontal one may feel on average: a grade of 30 %."""
 
 
@@ -19,15 +19,15 @@ def check(evidence: Evidence) -> list[Finding]:
     signals = [s for s in evidence.recording.find("acceleration") if s.component in ("x", "y", "z")]
     if not signals:
         return [Finding(NAME, "note", "", "Not looked at: no accelerometer.")]
-    findings = [finding for s in signals if (finding := _signal(s, evidence.mean(s)))]
+    findings = [finding for s in signals if (finding := _signal_finding(s, evidence.mean(s)))]
     quiet = "Every vertical accelerometer feels gravity as its channel map says, and no other does."
     return findings or [Finding(NAME, "note", "", quiet)]
 
 
-def _signal(signal: Signal, average: float) -> Finding | None:
+def _signal_finding(signal: Signal, average: float) -> Finding | None:
     if signal.component == "z":
-        return _vertical(signal, average)
-    if not abs(average) > LEVEL:
+        return _vertical_finding(signal, average)
+    if not abs(average) > HORIZONTAL_MEAN_LIMIT:
         return None
     text = (
         f"{signal.name} reads {average:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
@@ -36,9 +36,9 @@ def _signal(signal: Signal, average: float) -> Finding | None:
     return Finding(NAME, "error", signal.name, text, average, "m/s^2", (signal.name,))
 
 
-def _vertical(signal: Signal, average: float) -> Finding | None:
+def _vertical_finding(signal: Signal, average: float) -> Finding | None:
     if not signal.gravity:
-        if abs(average) < BIAS:
+        if abs(average) < VERTICAL_BIAS:
             return None
         text = (
             f"{signal.name} reads {average:.4g} m/s^2 on average, although the channel map says that gravity is not "
@@ -46,15 +46,15 @@ def _vertical(signal: Signal, average: float) -> Finding | None:
         )
         return Finding(NAME, "error", signal.name, text, average, "m/s^2", (signal.name,))
     missing = GRAVITY - average
-    if abs(missing) < BIAS:
+    if abs(missing) < VERTICAL_BIAS:
         return None
-    if abs(average) < BIAS:
+    if abs(average) < VERTICAL_BIAS:
         text = (
             f"{signal.name} reads {average:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
             "give gravity = false in the channel map."
         )
         return Finding(NAME, "error", signal.name, text, missing, "m/s^2", (signal.name,))
-    kind, text = sentence(average / GRAVITY, signal, "gravity, which it feels on average")
+    kind, text = cause_and_sentence(average / GRAVITY, signal, "gravity, which it feels on average")
     if kind in ("sign", "unit"):
         return Finding(kind, "error", signal.name, text, average / GRAVITY, "1", (signal.name,))
     text = (

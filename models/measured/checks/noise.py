@@ -5,7 +5,7 @@ import numpy as np
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
-from models.measured.signal import UNITS, Quantity
+from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 
 NAME = "noise"
 NOISE_RATIO = 1.5
@@ -18,8 +18,8 @@ def check(evidence: Evidence) -> list[Finding]:
     for signal in evidence.recording.signals:
         size, stated, unit = (
             noise(evidence.recording, signal),
-            evidence.claimed.get(signal.name),
-            UNITS[signal.quantity],
+            evidence.stated_noise.get(signal.name),
+            UNIT_OF_QUANTITY[signal.quantity],
         )
         sizes.setdefault(signal.quantity, []).append(size)
         if stated is not None and np.isfinite(size) and not 1 / NOISE_RATIO < size / max(stated, 1e-300) < NOISE_RATIO:
@@ -31,7 +31,7 @@ def check(evidence: Evidence) -> list[Finding]:
     notes = list[Finding]()
     for what, deviations in sizes.items():
         if np.isfinite(deviations).any():
-            unit, low, high = UNITS[what], float(np.nanmin(deviations)), float(np.nanmax(deviations))
+            unit, low, high = UNIT_OF_QUANTITY[what], float(np.nanmin(deviations)), float(np.nanmax(deviations))
             text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
             notes.append(Finding(NAME, "note", "", text, float(np.nanmean(deviations)), unit))
     return doubts + notes

@@ -15,17 +15,17 @@ from models.multibody.cut_table import HubInputs
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.kinematics import Kinematics
 
-STEP = 1e-3
-NUDGE = 1e-5
+MODEL_STEP = 1e-3
+STATE_DIFFERENCE = 1e-5
 """m and rad, m/s and rad/s: of the differences; the equations are smooth over metres."""
-PUSH = 100.0
+FORCE_DIFFERENCE = 100.0
 """N and N m: of the differences by forces, in which the equations are linear."""
-AXES = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
+AXIS_INDEX = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 
 
-def number(signal: Signal, hub: int) -> int:
+def component_index(signal: Signal, hub: int) -> int:
     """Index of a force's component among the components of all hubs; ``hub`` is the index of its hub."""
-    return WRENCH * hub + 3 * (signal.quantity == "moment") + AXES[signal.component]
+    return WRENCH * hub + 3 * (signal.quantity == "moment") + AXIS_INDEX[signal.component]
 
 
 class SensorResponse:
@@ -33,13 +33,15 @@ class SensorResponse:
 
     def __init__(self, vehicle: CutVehicle, frame: str) -> None:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
-        model, n = _built(vehicle, frame), vehicle.size
-        rest, moved = np.zeros(n), NUDGE * np.eye(n)
+        model, n = _static_model(vehicle, frame), vehicle.size
+        rest, moved = np.zeros(n), STATE_DIFFERENCE * np.eye(n)
         at = model.acceleration
-        self.stiff = np.column_stack([(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * NUDGE) for d in moved])
-        self.damped = np.column_stack([(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * NUDGE) for d in moved])
+        self.stiff = np.column_stack([(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * STATE_DIFFERENCE) for d in moved])
+        self.damped = np.column_stack([(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * STATE_DIFFERENCE) for d in moved])
         still, hubs = at(0.0, rest, rest), range(WRENCH * len(vehicle.hubs))
-        self.pushed = np.column_stack([(at((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in hubs])
+        self.pushed = np.column_stack(
+            [(at((i + 1) * MODEL_STEP / 2, rest, rest) - still) / FORCE_DIFFERENCE for i in hubs]
+        )
 
     def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[TransducerPlace]) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) from hub forces to the signals, each at its place, at frequencies (f,)
@@ -53,7 +55,7 @@ class SensorResponse:
 
     def _row(self, i_omega: np.ndarray, signal: Signal, transducer: TransducerPlace) -> np.ndarray:
         """Row (f, n) that maps the coordinates to the sensor's reading, at i_omega = i omega (f, 1)."""
-        axis, turn = AXES[signal.component], self.motion.turn(transducer.body)
+        axis, turn = AXIS_INDEX[signal.component], self.motion.turn(transducer.body)
         if signal.quantity == "angle":
             return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
         if signal.quantity == "angular rate":
@@ -64,11 +66,11 @@ class SensorResponse:
         return i_omega**2 * shift + tilt
 
 
-def _built(vehicle: CutVehicle, frame: str) -> HubModel:
+def _static_model(vehicle: CutVehicle, frame: str) -> HubModel:
     """A model with static loads alone at half step 0. At half step i + 1 a push on component i is added to the static
     loads."""
     hubs = WRENCH * len(vehicle.hubs)
     rows = np.zeros((hubs + 1, hubs))
     rows[:, 2::WRENCH] = vehicle.loads
-    rows[1:] += PUSH * np.eye(hubs)
-    return build("reference", vehicle, HubInputs(rows, frame), STEP, STEP * (hubs // 2))
+    rows[1:] += FORCE_DIFFERENCE * np.eye(hubs)
+    return build("reference", vehicle, HubInputs(rows, frame), MODEL_STEP, MODEL_STEP * (hubs // 2))

@@ -19,7 +19,9 @@ Axes = Sequence[Signal]
 def check(evidence: Evidence) -> list[Finding]:
     """Findings on bodies with three or more tri-axial accelerometers, one per body. Its size is the share of the
     readings, in %, that no rigid motion explains."""
-    findings = [_body(evidence, body, sensors) for body, sensors in _bodies(evidence).items() if len(sensors) > 2]
+    findings = [
+        _body_finding(evidence, body, sensors) for body, sensors in _bodies(evidence).items() if len(sensors) > 2
+    ]
     lacks = "Not looked at whether the body is rigid: this needs four tri-axial accelerometers on it, of known places."
     return findings or [Finding(NAME, "note", "", lacks)]
 
@@ -35,8 +37,8 @@ def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[TransducerPlace, Ax
     return bodies
 
 
-def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlace, Axes]]) -> Finding:
-    from models.sensors.rigid_body_motion import quality
+def _body_finding(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlace, Axes]]) -> Finding:
+    from models.sensors.rigid_body_motion import fit_quality
     from models.sensors.sensor_array import sensor_array
 
     try:
@@ -49,7 +51,7 @@ def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[TransducerPlac
     readings = np.moveaxis(np.array(columns), 2, 0)
     sizes = [noise(recording, s) for s in signals]
     deviation = float(np.sqrt(np.nanmean(np.square(sizes)))) if np.isfinite(sizes).any() else 0.0
-    rigidity = quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
+    rigidity = fit_quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
     if rigidity.rigid is None:
         return Finding(NAME, "note", body, f"{body}: {array.describe()[-1]}; a fourth sensor would tell.")
     left = f"{100 * rigidity.share:.2g} % of what its {len(axes)} accelerometers read against each other"

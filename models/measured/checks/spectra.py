@@ -11,7 +11,7 @@ import numpy as np
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 
-SEGMENT = 4.0
+SEGMENT_LENGTH = 4.0
 """s: resolves the modes of a car; shorter where the recording is."""
 FEWEST_SEGMENTS = 3
 """Segments in a recording at the least, half overlapping."""
@@ -19,11 +19,11 @@ FEWEST_FREQUENCIES = 2
 """Frequencies in the band at the least."""
 MOST_SEGMENTS = 300
 """Segments looked at, spread evenly: ten minutes."""
-OVERLAPPING = 0.75
+OVERLAP_FACTOR = 0.75
 """Independent averages that a half overlapping segment under a Hann window counts for, about."""
 TOP_BAND = 0.7, 0.95
 """Part of the highest frequency: above what vehicles do, below what filters and converters do at the end."""
-LENGTH, PIECES = 1024, 40
+PIECE_LENGTH, MOST_PIECES = 1024, 40
 """Samples of a piece whose noise is looked at, and pieces at the most, spread evenly."""
 SIDE_LINES = range(2, 5)
 """Spectral lines beside the main lobe of the window, whose power stands for that at 0."""
@@ -33,17 +33,17 @@ SIDE_LINES = range(2, 5)
 class Spectra:
     """Cross spectra averaged over segments: cross (f, n, n) = mean of X_i conj(X_j) at frequencies (f,) in Hz.
 
-    averages : how many independent ones; segments with a sample that is missing are left out. white : power in every
-    line of white noise of variance 1.
+    independent_averages : how many independent ones; segments with a sample that is missing are left out.
+    white_noise_power : power in every line of white noise of variance 1.
     """
 
     frequencies: np.ndarray
     cross: np.ndarray
-    averages: float
-    white: float
+    independent_averages: float
+    white_noise_power: float
 
 
-def spectra(
+def cross_spectra(
     recording: Recording, signals: tuple[Signal, ...], band: Sequence[float], stretch: tuple[int, int] | None = None
 ) -> Spectra | None:
     """Cross spectra in a band (Hz), in SI units squared by window sums squared; None if too few segments are complete,
@@ -52,7 +52,7 @@ def spectra(
     stretch : first sample and number of samples that are looked at; else all.
     """
     begin, count = stretch or (0, recording.count)
-    length = min(round(SEGMENT / recording.period), 2 * count // (FEWEST_SEGMENTS + 1))
+    length = min(round(SEGMENT_LENGTH / recording.period), 2 * count // (FEWEST_SEGMENTS + 1))
     firsts = np.arange(begin, begin + count - length + 1, max(length // 2, 1))
     frequencies = np.fft.rfftfreq(length, recording.period)
     in_band = (frequencies >= band[0]) & (frequencies <= band[1])
@@ -66,7 +66,9 @@ def spectra(
             segments += 1
     if segments < FEWEST_SEGMENTS or np.count_nonzero(in_band) < FEWEST_FREQUENCIES:
         return None
-    return Spectra(frequencies[in_band], cross / segments, max(1.0, OVERLAPPING * segments), float(np.sum(window**2)))
+    return Spectra(
+        frequencies[in_band], cross / segments, max(1.0, OVERLAP_FACTOR * segments), float(np.sum(window**2))
+    )
 
 
 def noise(recording: Recording, signal: Signal) -> float:
@@ -75,8 +77,8 @@ def noise(recording: Recording, signal: Signal) -> float:
     By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
     channels it is too small: what was there is gone.
     """
-    length = min(LENGTH, recording.count)
-    firsts = np.linspace(0, recording.count - length, min(PIECES, -(-recording.count // length))).astype(int)
+    length = min(PIECE_LENGTH, recording.count)
+    firsts = np.linspace(0, recording.count - length, min(MOST_PIECES, -(-recording.count // length))).astype(int)
     window = np.hanning(length + 2)[1:-1]
     pieces = [recording.columns.read(signal.name, int(first), length) for first in firsts]
     whole = np.array([piece for piece in pieces if np.isfinite(piece).all()])

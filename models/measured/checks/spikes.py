@@ -4,10 +4,10 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.signal import UNITS, Signal
+from models.measured.signal import UNIT_OF_QUANTITY, Signal
 
 NAME = "spikes"
-WIDTHS = 1, 2
+SPIKE_WIDTHS = 1, 2
 """Samples of a spike: one of a transducer or a converter, two where a jittering clock was put right."""
 STEEP_RATIO, HIGH_RATIO = 6.0, 3.0
 """Times the step from sample to sample that 99 % do not exceed, and times the channel's standard deviation: both sides
@@ -18,13 +18,13 @@ USUAL_SHARE = 0.99
 def check(evidence: Evidence) -> list[Finding]:
     """Findings on spikes of single samples. The size is the height of the highest spike, in the channel's unit."""
     recording = evidence.recording
-    findings = [_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
+    findings = [_spike_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
     return [finding for finding in findings if finding] or [
         Finding(NAME, "note", "", "No channel has a single-sample spike.")
     ]
 
 
-def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def spike_positions(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index (k,) of the first sample of each spike in values (n,), NaN where not measured, and the spikes' signed
     heights (k,)."""
     steps = np.diff(values)
@@ -33,18 +33,18 @@ def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.empty(0, np.int64), np.empty(0)
     least = max(STEEP_RATIO * float(np.quantile(known, USUAL_SHARE)), HIGH_RATIO * float(np.nanstd(values)))
     heights = np.zeros(len(values))
-    for width in WIDTHS:
+    for width in SPIKE_WIDTHS:
         up, down = steps[: len(steps) - width], -steps[width:]
         height = np.where(up * down > 0, np.sign(up) * np.minimum(np.abs(up), np.abs(down)), 0.0)
         heights[1 : 1 + len(height)] += np.where(np.abs(height) > least, height, 0.0)
     return np.flatnonzero(heights), heights[heights != 0.0]
 
 
-def _finding(signal: Signal, values: np.ndarray, period: float) -> Finding | None:
-    at, heights = spikes(values)
+def _spike_finding(signal: Signal, values: np.ndarray, period: float) -> Finding | None:
+    at, heights = spike_positions(values)
     if not len(at):
         return None
-    worst, unit = int(np.abs(heights).argmax()), UNITS[signal.quantity]
+    worst, unit = int(np.abs(heights).argmax()), UNIT_OF_QUANTITY[signal.quantity]
     text = (
         f"{signal.name} has {len(at)} spike(s) of one or two samples, the highest by {heights[worst]:+.4g} {unit} "
         f"at {period * at[worst]:.6g} s. A transducer or its cable makes such, and their damage is none of the "

@@ -3,26 +3,29 @@
 from models.core.finding import Finding
 from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import SEGMENT
+from models.measured.checks.spectra import SEGMENT_LENGTH
 
 NAME, PAIR = "swapped", "exchanged"
-FITS = 0.3
+LARGEST_UNEXPLAINED = 0.3
 """Share of the readings that may stay unexplained on average before vehicle and recording are called strangers: of
-segments of SEGMENT s. Shorter ones begin and end in the middle of the vehicle's vibrations, and leave as much more
+segments of SEGMENT_LENGTH s. Shorter ones begin and end in the middle of the vehicle's vibrations, and leave as much
+more
 unexplained: typically a half of right recordings of 1.5 s (angles and rates alone), a fifth of 6 s."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
     """Findings on exchanged hubs or channels. Sizes are the share of the inertial readings, in %, that the forces do
     not explain with the given channel map."""
-    if evidence.searched is None:
-        return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
-    findings = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
-    findings += [_pair(fault) for fault in evidence.faults if fault.kind == "crossed"]
+    if evidence.agreement_and_faults is None:
+        return [
+            Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.missing_data_text}.")
+        ]
+    findings = [_hub_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
+    findings += [_channel_pair_finding(fault) for fault in evidence.faults if fault.kind == "crossed"]
     return [*findings, _remaining_disagreement(evidence), _indistinguishable_hubs(evidence)]
 
 
-def _finding(fault: MeasurementFault) -> Finding:
+def _hub_finding(fault: MeasurementFault) -> Finding:
     text = (
         f"The channels of {fault.name} are exchanged: as mapped, the forces leave {100 * fault.size:.0f} % of the "
         f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
@@ -31,7 +34,7 @@ def _finding(fault: MeasurementFault) -> Finding:
     return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
-def _pair(fault: MeasurementFault) -> Finding:
+def _channel_pair_finding(fault: MeasurementFault) -> Finding:
     text = (
         f"{fault.name} are exchanged: as mapped, {100 * fault.size:.0f} % of the measured motion stays unexplained, "
         f"exchanged {100 * fault.error:.0f} %; exchange their names in the channel map."
@@ -41,8 +44,8 @@ def _pair(fault: MeasurementFault) -> Finding:
 
 def _indistinguishable_hubs(evidence: Evidence) -> Finding:
     """Finding on pairs of hubs whose forces move the vehicle so similarly that an exchange could not be seen."""
-    assert evidence.searched is not None
-    pairs = [" with ".join(s.name for s in pair) for pair in evidence.searched[0].blind()]
+    assert evidence.agreement_and_faults is not None
+    pairs = [" with ".join(s.name for s in pair) for pair in evidence.agreement_and_faults[0].undetectable_exchanges()]
     if not pairs:
         return Finding(PAIR, "note", "", "Any two channels of hub forces that were exchanged would be seen.")
     text = (
@@ -54,8 +57,8 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
 
 def _remaining_disagreement(evidence: Evidence) -> Finding:
     """Finding on the disagreement of forces and motion that remains after all faults are corrected."""
-    assert evidence.searched is not None
-    left = evidence.searched[0]
+    assert evidence.agreement_and_faults is not None
+    left = evidence.agreement_and_faults[0]
     share = left.unexplained
     low, high = int(share.argmin()), int(share.argmax())
     best, worst = (f"{100 * share[i]:.2g} % ({left.outputs[i].name})" for i in (low, high))
@@ -63,10 +66,10 @@ def _remaining_disagreement(evidence: Evidence) -> Finding:
         f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
         f"size between {left.frequencies[0]:.3g} and {left.frequencies[-1]:.3g} Hz"
     )
-    told, resolved = left.typical(), float(left.frequencies[1] - left.frequencies[0])
-    if told <= FITS:
+    told, resolved = left.median_unexplained(), float(left.frequencies[1] - left.frequencies[0])
+    if told <= LARGEST_UNEXPLAINED:
         return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
-    if told <= FITS * SEGMENT * resolved:
+    if told <= LARGEST_UNEXPLAINED * SEGMENT_LENGTH * resolved:
         text += f". Segments of {1 / resolved:.3g} s are too short to say whether they belong together"
         return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
     text += (

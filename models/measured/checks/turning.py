@@ -4,14 +4,14 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import spectra
-from models.measured.ratios import sentence
+from models.measured.checks.spectra import cross_spectra
+from models.measured.ratios import cause_and_sentence
 from models.measured.signal import Signal
 
 NAME = "turning"
-BAND = 0.5, 12.0
+COMPARED_BAND = 0.5, 12.0
 """Hz."""
-COHERENT = 0.8
+LEAST_COHERENCE = 0.8
 """Squared coherence of lines that are used; below it noise speaks."""
 IN_PHASE_SHARE = 0.25
 """Part of a rate in phase with the angle's derivative from which on a factor between them means anything."""
@@ -27,35 +27,38 @@ def check(evidence: Evidence) -> list[Finding]:
         (angle, rate)
         for angle in recording.find("angle")
         for rate in recording.find("angular rate")
-        if rate.component == angle.component != "yaw" and _body(evidence, rate) == _body(evidence, angle)
+        if rate.component == angle.component != "yaw"
+        and _body_of_signal(evidence, rate) == _body_of_signal(evidence, angle)
     ]
     if not pairs:
         return [Finding(NAME, "note", "", "Angles were not compared with rates: no body has both of one axis.")]
-    return [_pair(evidence, *pair) for pair in pairs]
+    return [_pair_finding(evidence, *pair) for pair in pairs]
 
 
-def _body(evidence: Evidence, signal: Signal) -> str:
+def _body_of_signal(evidence: Evidence, signal: Signal) -> str:
     place = evidence.place(signal)
     return place.body if place else signal.at
 
 
-def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
+def _pair_finding(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     recording, names, both = evidence.recording, f"{rate.name} and {angle.name}", (rate.name, angle.name)
-    pair_spectra = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
+    pair_spectra = cross_spectra(
+        recording, (angle, rate), (COMPARED_BAND[0], min(COMPARED_BAND[1], 0.4 / recording.period))
+    )
     squared = np.zeros(0)
     if pair_spectra is not None:
         squared = (
             np.abs(pair_spectra.cross[:, 0, 1]) ** 2 / (pair_spectra.cross[:, 0, 0] * pair_spectra.cross[:, 1, 1]).real
         )
-    used = squared > COHERENT
+    used = squared > LEAST_COHERENCE
     if pair_spectra is None or np.count_nonzero(used) < 2:
         return Finding(NAME, "note", names, f"{names} could not be compared: too little turning above their noise.")
     omega, cross, squared = 2 * np.pi * pair_spectra.frequencies[used], pair_spectra.cross[used], squared[used]
     transfer = cross[:, 1, 0] / (1j * omega * cross[:, 0, 0].real)
     weight = squared / np.maximum(1 - squared, 1e-6)
     ratio = float((weight @ transfer).real / weight.sum())
-    late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.averages, ratio)
-    wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
+    late, error = _delay_by_phase(transfer, omega, weight * pair_spectra.independent_averages, ratio)
+    wrong, text = cause_and_sentence(ratio, rate, f"the derivative of {angle.name}")
     if wrong in ("sign", "unit") and _rate_ratio(transfer, weight) < IN_PHASE_SHARE:
         text = (
             f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "

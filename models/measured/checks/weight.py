@@ -11,9 +11,9 @@ from models.core.finding import Finding
 from models.measured import axle_forces
 from models.measured.axle_balance import axles
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.response import number
+from models.measured.checks.response import component_index
 from models.measured.checks.spectra import windowed_means
-from models.measured.ratios import EMPTY, counted_from_load, sentence
+from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, cause_and_sentence, counted_from_load
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
@@ -60,27 +60,29 @@ def check(evidence: Evidence) -> list[Finding]:
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
     signals = tuple(of_hub[hub] for hub in vehicle.hubs)
-    numbers, means = _component_numbers(evidence, vehicle), windowed_means(_columns(evidence, vehicle))
+    numbers, means = _component_numbers(evidence, vehicle), windowed_means(_force_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_wrong_sign_or_unit(evidence, *each) for each in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
-    return [_single_channel_error(evidence, _balance(vehicle, numbers, *means), signals, at)]
+    return [_single_channel_error(evidence, _balance_of_means(vehicle, numbers, *means), signals, at)]
 
 
-def moments(evidence: Evidence) -> np.ndarray:
+def mean_hub_moments(evidence: Evidence) -> np.ndarray:
     """Mean moments (2,) of the hub forces about x and y, N m, that the measured rates of roll and pitch contradict.
     They come from offsets, gains, or a load missing in the vehicle file. Both are 0 if they may be chance, or are
     unknown."""
     vehicle, none = evidence.vehicle, np.zeros(2)
     if vehicle is None or evidence.frame == "inertial" or not _angular_acceleration_readers(evidence, vehicle):
         return none
-    balanced = _balance(vehicle, _component_numbers(evidence, vehicle), *windowed_means(_columns(evidence, vehicle)))
+    balanced = _balance_of_means(
+        vehicle, _component_numbers(evidence, vehicle), *windowed_means(_force_columns(evidence, vehicle))
+    )
     left, sure = balanced.left[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
     return left if (np.abs(left) > MOMENT_STANDARD_DEVIATIONS * sure).any() else none
 
 
-def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
+def _force_columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
     """Functions that read all hub forces, and the angular accelerations of roll and pitch."""
     forces: list[Callable[[], np.ndarray]] = [partial(evidence.recording.samples, s) for s in evidence.forces]
     return forces + _angular_acceleration_readers(evidence, vehicle)
@@ -100,21 +102,21 @@ def _angular_acceleration_readers(evidence: Evidence, vehicle: CutVehicle) -> li
 
 def _component_numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
     """Indices (k,) of the measured components among the components of all hubs."""
-    return [number(s, vehicle.hubs.index(evidence.hub(s))) for s in evidence.forces]
+    return [component_index(s, vehicle.hubs.index(evidence.hub(s))) for s in evidence.forces]
 
 
 def _wrong_sign_or_unit(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
     kind, text = (
         ("size", counted_from_load(signal.name, load, static))
-        if abs(load) < EMPTY * static and evidence.empty(signal)
-        else sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
+        if abs(load) < NEGLIGIBLE_MEAN_SHARE * static and evidence.empty(signal)
+        else cause_and_sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
     )
     if kind == "gain":
         return None
     return Finding(NAME if kind == "size" else kind, "error", signal.name, text, load / static, "1", (signal.name,))
 
 
-def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
+def _balance_of_means(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread: np.ndarray) -> Balance:
     """Equilibrium from mean signals (k,), or (k + 2,) with the mean angular accelerations of roll and pitch, whose
     inertia moments are then taken into account."""
     whole, hubs = rigid(vehicle), len(vehicle.hubs)
@@ -152,8 +154,8 @@ def _single_channel_error(
     ):
         signal, size = signals[worst], share * loads[worst]
         if _moves_rightly(evidence, signal, share):
-            return _offset(signal, size, uncertainty * loads[worst])
-        _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
+            return _offset_finding(signal, size, uncertainty * loads[worst])
+        _, text = cause_and_sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
         text += (
             f" The mean is known to {2 * uncertainty:.2%} (95 %), and what is too much acts at this hub alone; an "
             f"offset of {size:+.3g} N would do the same."
@@ -178,13 +180,13 @@ def _single_channel_error(
 def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
     """Whether the vehicle's motion shows that a channel's factor is right, although the mean suggests an error of this
     share."""
-    if evidence.searched is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
+    if evidence.agreement_and_faults is None or any(signal in f.signals for f in evidence.faults if f.kind == "factor"):
         return False
-    ratio, error = evidence.searched[0].factor(signal)
+    ratio, error = evidence.agreement_and_faults[0].factor(signal)
     return 4 * error < abs(share) and abs(ratio - 1) < MOTION_SHARE * abs(share)
 
 
-def _offset(signal: Signal, size: float, sure: float) -> Finding:
+def _offset_finding(signal: Signal, size: float, sure: float) -> Finding:
     """Finding on a constant error (N) of one channel."""
     zero = size / (signal.sign * signal.factor)
     word = "much" if size > 0 else "little"

@@ -11,18 +11,18 @@ from models.measured.channel import Source
 from models.measured.file_kinds import KNOWN_FORMATS, by_extension, format_of, usual_of
 from models.measured.formats.csv import open_csv
 from models.measured.formats.mdf4 import open_mdf
-from models.measured.formats.opened import Opened, notice
+from models.measured.formats.opened import OpenFile, flaw_finding
 from models.measured.formats.rpc3 import open_rpc
 from models.measured.formats.tdms import open_tdms
-from models.measured.formats.writing import WRITERS, ChannelGroup, check, new_file
+from models.measured.formats.writing import WRITER_OF_EXTENSION, ChannelGroup, check, new_file
 
-READERS: dict[str, Callable[[Path], Opened]] = {
+READER_OF_FORMAT: dict[str, Callable[[Path], OpenFile]] = {
     "CSV": open_csv,
     "ASAM MDF": open_mdf,
     "RPC III": open_rpc,
     "TDMS": open_tdms,
 }
-DRIVE = (
+DRIVE_FILE_ADVICE = (
     "a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
     "(.rsp) of the same run"
 )
@@ -40,9 +40,9 @@ def open_source(path: str | Path) -> Source:
     InputError : naming the file, and the byte, line or sample where it cannot be read
     """
     path = Path(path)
-    form = format_of(path, _head(path))
+    form = format_of(path, _first_bytes(path))
     try:
-        source = READERS[form](path)
+        source = READER_OF_FORMAT[form](path)
     except InputError as error:  # what is said of text that is no CSV knows the extension
         if form != "CSV" or not by_extension(path):
             raise
@@ -50,9 +50,9 @@ def open_source(path: str | Path) -> Source:
     usual, said = usual_of(path.suffix.lower(), form), list[Finding]()
     if usual != form:
         text = f"the extension {path.suffix} is that of {usual}, but the file is read as {form}"
-        said.append(notice(path, "doubt", text))
+        said.append(flaw_finding(path, "doubt", text))
     if form == "RPC III" and path.suffix.lower() == ".drv":
-        said.append(notice(path, "doubt", DRIVE))
+        said.append(flaw_finding(path, "doubt", DRIVE_FILE_ADVICE))
     return replace(source, noticed=(*said, *source.noticed))
 
 
@@ -74,15 +74,17 @@ def write(path: str | Path, groups: Sequence[ChannelGroup], start: datetime | No
         that can be known beforehand, before any block is taken
     """
     path = Path(path)
-    if path.suffix.lower() not in WRITERS:
-        raise InputError(path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITERS))
+    if path.suffix.lower() not in WRITER_OF_EXTENSION:
+        raise InputError(
+            path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITER_OF_EXTENSION)
+        )
     check(path, groups, start)
     with new_file(path) as part:
-        WRITERS[path.suffix.lower()](path, part, groups, start, comment)
+        WRITER_OF_EXTENSION[path.suffix.lower()](path, part, groups, start, comment)
     return path
 
 
-def _head(path: Path) -> bytes:
+def _first_bytes(path: Path) -> bytes:
     """First bytes of a file."""
     if not path.exists():
         raise InputError(path, "", None, f"the file does not exist{similar_file(path)}")

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.csv_header import Head, heading
+from models.core.csv_header import TableHead, name_and_unit
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.tables import SECONDS
@@ -32,12 +32,19 @@ from models.measured.formats.csv_layout import (
     find_units,
     read_first_lines,
 )
-from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, numbers, one_byte_text
-from models.measured.formats.opened import Opened, Span, distinct_names, notice, readable, zoned
+from models.measured.formats.csv_rows import ROWS_PER_MARK, Layout, find_rows, numbers_of_rows, one_byte_text
+from models.measured.formats.opened import (
+    OpenFile,
+    Span,
+    distinct_names,
+    flaw_finding,
+    library_errors_as_input,
+    start_with_zone,
+)
 
 
 @dataclass(frozen=True)
-class CsvFile(Opened):
+class CsvFile(OpenFile):
     """Reader of a CSV file; ``rows[k]`` is the byte where row 1000 k begins, its last element the end of the used rows.
 
     clock : column of time among those of numbers, None where times are those of the clock. factor : to s. columns :
@@ -55,32 +62,32 @@ class CsvFile(Opened):
         columns = [self.columns[i] for i in channel_indices]
         with self.path.open("rb") as file:
             for first, count in spans:
-                table, times = numbers(self.path, self.layout, self._lines(file, first, count), first)
+                table, times = numbers_of_rows(self.path, self.layout, self._bytes_of_rows(file, first, count), first)
                 yield self.factor * table[:, self.clock] if times is None else times, table[:, columns]
 
-    def _lines(self, file: io.BufferedReader, first: int, count: int) -> bytes:
+    def _bytes_of_rows(self, file: io.BufferedReader, first: int, count: int) -> bytes:
         """Bytes of ``count`` rows from row ``first`` on."""
-        low, high = first // STRIDE, min(-(-(first + count) // STRIDE), len(self.rows) - 1)
+        low, high = first // ROWS_PER_MARK, min(-(-(first + count) // ROWS_PER_MARK), len(self.rows) - 1)
         file.seek(int(self.rows[low]))
         text = file.read(int(self.rows[high] - self.rows[low]))
         unit = self.layout.unit
         ends = np.flatnonzero(np.frombuffer(text, unit) == ord("\n"))
-        skipped = first - low * STRIDE
+        skipped = first - low * ROWS_PER_MARK
         begin = 0 if skipped == 0 else int(ends[skipped - 1]) + 1
         return text[begin * unit.itemsize : (int(ends[skipped + count - 1]) + 1) * unit.itemsize]
 
 
 def open_csv(path: Path) -> CsvFile:
     """Read the header, count the rows and find out how they are written; raises InputError."""
-    with readable(path):
+    with library_errors_as_input(path):
         top = read_first_lines(path)
         head, clock, remarks, findings = find_headings_of(path, top)
         units, more = find_units(path, top, head, clock)
         layout, notes = find_layout(path, top, head, clock, units)
         rows, count, left = find_rows(path, layout)
         findings += notes + more + _findings_on_end(path, layout, remarks, count, left)
-        factor = 1.0 if layout.stamps else _factor(path, head, clock, units[clock])
-        start, notes = zoned(path, remarks.start) if remarks.start else (layout.start, [])
+        factor = 1.0 if layout.time_stamps else _factor_to_seconds(path, head, clock, units[clock])
+        start, notes = start_with_zone(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
         if not columns:
             raise InputError(
@@ -91,7 +98,7 @@ def open_csv(path: Path) -> CsvFile:
             )
         groups = head.groups()
         families = [groups[i] if groups else "" for i in columns]
-        names, repeated = distinct_names(path, [heading(head.names[i])[0] for i in columns], families)
+        names, repeated = distinct_names(path, [name_and_unit(head.names[i])[0] for i in columns], families)
         channels = tuple(
             Channel(
                 name,
@@ -122,13 +129,13 @@ def open_csv(path: Path) -> CsvFile:
 def unit_of(text: str) -> str:
     """Unit in a heading: in brackets, or in parentheses if the text there is a unit of a quantity that can be
     mapped."""
-    unit = heading(text)[1]
+    unit = name_and_unit(text)[1]
     bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
     if bracketed is None:
         return unit
-    from models.measured.units import quantities
+    from models.measured.units import quantities_of_unit
 
-    return bracketed[1].strip() if quantities(bracketed[1]) else ""
+    return bracketed[1].strip() if quantities_of_unit(bracketed[1]) else ""
 
 
 def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
@@ -142,16 +149,16 @@ def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, l
             whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
         ends = "may be" if whole else "is"
         text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
-        said.append(notice(path, "note" if whole else "doubt", text))
+        said.append(flaw_finding(path, "note" if whole else "doubt", text))
     if samples is not None and samples > count:
         text = f"the header announces {samples} rows, but {count} are there: the file is cut off"
-        said.append(notice(path, "doubt", text))
+        said.append(flaw_finding(path, "doubt", text))
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
     return said
 
 
-def _factor(path: Path, header: Head, clock: int, unit: str) -> float:
+def _factor_to_seconds(path: Path, header: TableHead, clock: int, unit: str) -> float:
     """Factor that converts the column of times to seconds."""
     name, given = clock_heading(header.names[clock])
     if (given or unit).casefold() not in TIME_UNITS:

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from models.core.csv_header import (
-    MARKS,
+    CLOCK_TIME_PATTERN,
+    MISSING_VALUE_PATTERN,
     SEPARATORS,
-    TIMED,
-    Head,
-    Line,
+    FileLine,
+    TableHead,
     decimal_sign,
     find_head,
     find_headings,
-    heading,
     is_number,
+    name_and_unit,
     separator_line,
     split_cells,
 )
@@ -26,13 +26,13 @@ from models.core.errors import InputError
 from models.core.finding import Finding, Weight
 from models.measured.formats.csv_rows import Layout
 from models.measured.formats.csv_times import find_stamps
-from models.measured.formats.opened import notice
+from models.measured.formats.opened import flaw_finding
 
 FIRST_ROWS_BYTES = 1 << 20
 """Bytes among which the first rows of numbers must be."""
 FIRST_ROWS_LINES = 2000
 """Lines among which they must be."""
-CLOCKS = ("time", "zeit", "t")
+TIME_COLUMN_NAMES = ("time", "zeit", "t")
 OTHER_CLOCKS = (
     "timestamp",
     "timestamps",
@@ -74,29 +74,31 @@ TIME_UNITS = {
     "ns": 1e-9,
 }
 """In small letters -> s."""
-_RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
-_DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
-_BEGUN = re.compile(r"[+-]?[.,]?\d")
+_RATE_PATTERN = re.compile(
+    r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE
+)
+_DATE_PATTERN = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
+_NUMBER_START_PATTERN = re.compile(r"[+-]?[.,]?\d")
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
 """Marks that text begins with, and how it is then written."""
-NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
+NEEDED_HEADER_TEXT = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
 @dataclass
-class Top:
+class FirstLines:
     """Facts about the format of a file from its first lines.
 
-    lines : those that are neither empty nor comments. hashed : comments that begin with ``#``. separator : as a line
-    ``sep=`` says. foreign : numbers of lines that are no UTF-8. unit : of characters. stopped : number of the line
-    that could not be read, 0 for none.
+    lines : those that are neither empty nor comments. comment_lines : comments that begin with ``#``. separator : as a
+    line ``sep=`` says. undecodable_lines : numbers of lines that are no UTF-8. unit : of characters. unreadable_line :
+    number of the line that could not be read, 0 for none.
     """
 
     unit: np.dtype
-    lines: list[Line] = field(default_factory=list)
-    hashed: list[Line] = field(default_factory=list)
+    lines: list[FileLine] = field(default_factory=list)
+    comment_lines: list[FileLine] = field(default_factory=list)
     separator: str = ""
-    foreign: list[Line] = field(default_factory=list)
-    stopped: int = 0
+    undecodable_lines: list[FileLine] = field(default_factory=list)
+    unreadable_line: int = 0
 
 
 @dataclass
@@ -131,32 +133,34 @@ def _text(path: Path, line_number: int, quoted: str) -> str:
         raise InputError(path, f"line {line_number}", quoted, "a channel's name in quotes is needed") from None
 
 
-def read_first_lines(path: Path) -> Top:
+def read_first_lines(path: Path) -> FirstLines:
     """First lines of a file; InputError where no line is text."""
     with path.open("rb") as file:
         data = file.read(FIRST_ROWS_BYTES)
     codec, mark = next(
         ((codec, mark) for mark, codec in BYTE_ORDER_MARKS.items() if data.startswith(mark)), ("utf-8", b"")
     )
-    top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
-    for line in _lines(data, len(mark), codec, top):
+    top = FirstLines(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
+    for line in _complete_lines(data, len(mark), codec, top):
         shown = line.text.strip()
         if line.number == 1 and separator_line(line.text):
             top.separator = separator_line(line.text)
         elif shown.startswith("#"):
-            top.hashed.append(line)
+            top.comment_lines.append(line)
         elif shown:
             top.lines.append(line)
     if top.separator and top.separator not in SEPARATORS:
         raise InputError(path, "line 1", top.separator, f"{', '.join(SEPARATORS.values())} can part the columns")
-    if not top.lines and not (top.hashed and not top.stopped):
+    if not top.lines and not (top.comment_lines and not top.unreadable_line):
         old = b"\r" in data and b"\n" not in data
         hint = ": lines end as on an old Macintosh, and have to be saved with line ends of today" if old else ""
-        raise InputError(path, f"line {top.stopped or len(top.hashed) + 1}", None, NEEDED + hint)
+        raise InputError(
+            path, f"line {top.unreadable_line or len(top.comment_lines) + 1}", None, NEEDED_HEADER_TEXT + hint
+        )
     return top
 
 
-def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
+def _complete_lines(data: bytes, begin: int, codec: str, top: FirstLines) -> Iterator[FileLine]:
     """Complete lines of text, up to the first one that contains a zero character or has no line end."""
     size = top.unit.itemsize
     ends = (np.flatnonzero(np.frombuffer(data[: len(data) // size * size], top.unit) == ord("\n")) + 1) * size
@@ -166,19 +170,19 @@ def _lines(data: bytes, begin: int, codec: str, top: Top) -> Iterator[Line]:
         except UnicodeDecodeError:
             text, foreign = data[begin:end].decode("cp1252", errors="replace"), True
         if "\0" in text:
-            top.stopped = number
+            top.unreadable_line = number
             return
-        line = Line(number, text.rstrip("\r\n"), begin, end)
+        line = FileLine(number, text.rstrip("\r\n"), begin, end)
         if foreign:
-            top.foreign.append(line)
+            top.undecodable_lines.append(line)
         yield line
         begin = end
-    top.stopped = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
+    top.unreadable_line = len(ends) + 1 if len(ends) < FIRST_ROWS_LINES else 0
 
 
-def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Finding]]:
+def find_headings_of(path: Path, top: FirstLines) -> tuple[TableHead, int, Remarks, list[Finding]]:
     """Headings above the numbers, column of time, and facts in the comments; findings on these lines are included."""
-    head, known = _head(path, top)
+    head, known = _table_head(path, top)
     clocks = [i for i, name in enumerate(head.names) if known(name)]
     if len(clocks) != 1:
         raise InputError(
@@ -188,31 +192,33 @@ def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Fin
             f"one column time [s] is needed, found {len(clocks)}",
         )
     remarks = Remarks()
-    above = [line for line in (*top.hashed, *head.titles) if line.number <= head.line and line != head.header]
+    above = [line for line in (*top.comment_lines, *head.titles) if line.number <= head.line and line != head.header]
     for line in sorted(above):
-        if line in top.hashed:
+        if line in top.comment_lines:
             remarks.add(path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
-    foreign = {passage.number: passage.text.strip()[:60] for passage in top.foreign if passage.number <= head.line}
+    foreign = {
+        passage.number: passage.text.strip()[:60] for passage in top.undecodable_lines if passage.number <= head.line
+    }
     odd = "is not UTF-8 and is read as Windows-1252"
-    said = [notice(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
+    said = [flaw_finding(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
     if top.unit.itemsize > 1:
-        said.append(notice(path, "note", "the text is UTF-16"))
+        said.append(flaw_finding(path, "note", "the text is UTF-16"))
     if head.titles:
         text = f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment"
-        said.append(notice(path, "note", text))
+        said.append(flaw_finding(path, "note", text))
     return head, clocks[0], remarks, said
 
 
 Known = Callable[[str], bool]
 
 
-def _head(path: Path, top: Top) -> tuple[Head, Known]:
+def _table_head(path: Path, top: FirstLines) -> tuple[TableHead, Known]:
     """Headings above the numbers, found by the first method that gives exactly one result. Lines behind # count too,
     since numpy writes headings there."""
     signs = (top.separator,) if top.separator else tuple(SEPARATORS)
-    bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.hashed]
+    bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in top.comment_lines]
     every = sorted((*top.lines, *bare))
     for find, lines in ((find_head, top.lines), (find_head, every), (find_headings, top.lines)):
         for known in (is_clock, is_other_clock):
@@ -228,19 +234,21 @@ def _head(path: Path, top: Top) -> tuple[Head, Known]:
     raise _without_clock(path, top, signs)
 
 
-def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
+def _without_clock(path: Path, top: FirstLines, signs: tuple[str, ...]) -> InputError:
     """Error that says why no line can be the headings, and what the user has to write."""
-    lines = top.lines or top.hashed
+    lines = top.lines or top.comment_lines
     first = next((line for line in lines if any(sign in line.text for sign in signs)), lines[0])
     place, text = f"line {first.number} (header)", first.text.strip()
-    rate = next((line for line in (*top.lines, *top.hashed) if _RATE.search(line.text)), None)
+    rate = next((line for line in (*top.lines, *top.comment_lines) if _RATE_PATTERN.search(line.text)), None)
     if rate is not None:
         needed = (
             f"one column time [s] is needed, found 0: line {rate.number} ({rate.text.strip()[:40]!r}) speaks of the "
             "sampling; write the time of every row"
         )
     elif not any(sign in first.text for sign in signs):
-        needed = f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED}"
+        needed = (
+            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED_HEADER_TEXT}"
+        )
     elif any(all(map(is_number, cells)) for sign in signs if len(cells := split_cells(text, sign)) > 1):
         needed = "the file begins with numbers: write a header line time [s], name [unit], ... above them"
     else:
@@ -250,7 +258,7 @@ def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
 
 def clock_heading(text: str) -> tuple[str, str]:
     """Name and unit of the heading of a clock: in brackets, or as ``time (s)``, ``time / s``, ``time_s``."""
-    name, unit = heading(text)
+    name, unit = name_and_unit(text)
     in_name = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
     if in_name is not None and (in_name[2] is not None or in_name[3].casefold() in TIME_UNITS):
         return in_name[1], (in_name[2] or in_name[3] or "").strip()
@@ -259,7 +267,7 @@ def clock_heading(text: str) -> tuple[str, str]:
 
 def is_clock(text: str) -> bool:
     """Whether a heading is that of the column of time."""
-    return clock_heading(text)[0].casefold() in CLOCKS
+    return clock_heading(text)[0].casefold() in TIME_COLUMN_NAMES
 
 
 def is_other_clock(text: str) -> bool:
@@ -269,20 +277,22 @@ def is_other_clock(text: str) -> bool:
     return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
-def first_rows(top: Top, header: Head) -> list[list[str]]:
+def first_rows(top: FirstLines, header: TableHead) -> list[list[str]]:
     """Cells of each column in the first rows of numbers; rows of another width are skipped here and reported later."""
     lines = [line for line in top.lines if line.number > header.line]
     rows = [cells for line in lines if len(cells := split_cells(line.text, header.separator)) == header.width]
     return [[row[i] for row in rows] for i in range(len(header.names))]
 
 
-def find_layout(path: Path, top: Top, header: Head, clock: int, units: tuple[str, ...]) -> tuple[Layout, list[Finding]]:
+def find_layout(
+    path: Path, top: FirstLines, header: TableHead, clock: int, units: tuple[str, ...]
+) -> tuple[Layout, list[Finding]]:
     """How the rows of a CSV file are written, from the first rows; InputError where two interpretations are
     possible."""
     columns = first_rows(top, header)
     first = next(iter(columns[clock]), "")
     stamps = find_stamps(path, first, header.line + 1, header.names[clock]) if is_stamp(first) else None
-    nameless = tuple(i for i, name in enumerate(header.names) if not heading(name)[0])
+    nameless = tuple(i for i, name in enumerate(header.names) if not name_and_unit(name)[0])
     texts = tuple(i for i, cells in enumerate(columns) if i not in (clock, *nameless) and _is_text(cells))
     taken = tuple(sorted({*texts, *nameless, *((clock,) if stamps else ())}))
     numbers = {cell: None for i, cells in enumerate(columns) if i not in taken for cell in cells}
@@ -292,26 +302,29 @@ def find_layout(path: Path, top: Top, header: Head, clock: int, units: tuple[str
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if units[i] or heading(header.names[i])[1] else "note"
-        said.append(notice(path, weight, f"left out, no numbers: {header.names[i]!r}"))
+        weight: Weight = "doubt" if units[i] or name_and_unit(header.names[i])[1] else "note"
+        said.append(flaw_finding(path, weight, f"left out, no numbers: {header.names[i]!r}"))
     for i in nameless:
         cells = columns[i]
         counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
         weight = "note" if counts else "doubt"
-        said.append(notice(path, weight, f"column {i + 1} has no name and is left out"))
-    return layout, said + [notice(path, "note", text) for text in _layout_remarks(layout, list(numbers))]
+        said.append(flaw_finding(path, weight, f"column {i + 1} has no name and is left out"))
+    return layout, said + [flaw_finding(path, "note", text) for text in _layout_remarks(layout, list(numbers))]
 
 
 def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
     """Sentences on every deviation from the usual form: commas between columns of numbers with decimal points."""
-    stamps = layout.stamps
+    stamps = layout.time_stamps
     if stamps is not None:
-        wraps = "; they go on past midnight" if stamps.form == "hh:mm:ss.fff" else ""
+        wraps = "; they go on past midnight" if stamps.notation == "hh:mm:ss.fff" else ""
         yield (
-            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.form}); seconds are counted from the "
+            f"{layout.names[layout.clock]!r} holds times of the clock ({stamps.notation}); seconds are "
+            "counted from the "
             f"first, {stamps.first}{wraps}"
         )
-    marks = [repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MARKS.fullmatch(cell)]
+    marks = [
+        repr(cell) for cell in cells if cell.casefold() not in ("", "nan") and MISSING_VALUE_PATTERN.fullmatch(cell)
+    ]
     if marks:
         yield f"cells {', '.join(marks)} are read as not measured"
     sign = "comma" if layout.decimal == "," else "point"
@@ -321,35 +334,40 @@ def _layout_remarks(layout: Layout, cells: list[str]) -> Iterator[str]:
 
 def is_stamp(cell: str) -> bool:
     """Whether a cell is a time of day or a date with time."""
-    return not is_number(cell) and TIMED.fullmatch(cell) is not None
+    return not is_number(cell) and CLOCK_TIME_PATTERN.fullmatch(cell) is not None
 
 
 def _is_text(cells: list[str]) -> bool:
     """Whether a column holds text or dates, so that no cell in it can be a number."""
-    said = [cell for cell in cells if not MARKS.fullmatch(cell)]
-    return bool(said) and all(TIMED.fullmatch(cell) or _DATE.fullmatch(cell) or not _BEGUN.match(cell) for cell in said)
+    said = [cell for cell in cells if not MISSING_VALUE_PATTERN.fullmatch(cell)]
+    return bool(said) and all(
+        CLOCK_TIME_PATTERN.fullmatch(cell) or _DATE_PATTERN.fullmatch(cell) or not _NUMBER_START_PATTERN.match(cell)
+        for cell in said
+    )
 
 
-def find_units(path: Path, top: Top, header: Head, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
+def find_units(path: Path, top: FirstLines, header: TableHead, clock: int) -> tuple[tuple[str, ...], list[Finding]]:
     """Units of the columns from a row below the headings; empty if there is no such row."""
     stamped = any(map(is_stamp, first_rows(top, header)[clock][:1]))
-    rows = [(line, [_bare(cell) for cell in header.cells(line)]) for line in header.between]
+    rows = [(line, [_bare_unit(cell) for cell in header.cells(line)]) for line in header.between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(header.names[clock])[1] else set(TIME_UNITS)
     unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
     if unit_row is None:
         said = [
-            notice(path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}")
+            flaw_finding(
+                path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}"
+            )
             for line, _ in rows
         ]
         return ("",) * len(header.names), said
     line, units = unit_row
     for i, (name, unit) in enumerate(zip(header.names, units, strict=True)):
-        if unit not in ("", "-") and heading(name)[1] not in ("", unit) and not (stamped and i == clock):
+        if unit not in ("", "-") and name_and_unit(name)[1] not in ("", unit) and not (stamped and i == clock):
             raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
-    return tuple(units), [notice(path, "note", f"line {line.number}, beneath the headings, is read as units")]
+    return tuple(units), [flaw_finding(path, "note", f"line {line.number}, beneath the headings, is read as units")]
 
 
-def _bare(cell: str) -> str:
+def _bare_unit(cell: str) -> str:
     """A unit without its surrounding brackets."""
     brackets = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
     return (brackets[1] if brackets else cell).strip()

@@ -15,23 +15,23 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.csv_header import MARKS
+from models.core.csv_header import MISSING_VALUE_PATTERN
 from models.core.errors import InputError
 from models.measured.formats.csv_times import Stamps
 
-STRIDE = 1000
+ROWS_PER_MARK = 1000
 """Rows from one place of the table of rows to the next."""
-CHUNK = 1 << 22
+BYTES_PER_READ = 1 << 22
 """Bytes read at once while rows are counted."""
-TAIL = 1000
+TAIL_CHARACTERS = 1000
 """Characters at the end of a file among which empty lines are looked for."""
-_GAPS = ["", "nan", "NaN", "NAN", "NA", "na", "-", "--", "---"]
+_GAP_CELLS = ["", "nan", "NaN", "NAN", "NA", "na", "-", "--", "---"]
 """Usual cells that say that nothing was measured; others are looked for where these do not do."""
-_PLAIN = bytes(range(32, 127)) + b"\n"
+_PLAIN_BYTES = bytes(range(32, 127)) + b"\n"
 """Bytes of which numbers and marks are made; where there are others, every cell is looked at."""
-_WRONG = "\x1a"
+_QUOTED_SEPARATOR = "\x1a"
 """What stands for a separator within quotes: never a part of a number."""
-_THOUSANDS = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([.,]\d+)?\s*")
+_THOUSANDS_PATTERN = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([.,]\d+)?\s*")
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Layout:
     """How the rows of a CSV file are written: separators, columns, clock.
 
     separator, decimal : signs. begin : byte where the rows begin. line : number of the line before them. names :
-    headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. texts : columns
-    that hold no numbers. clock : the column of time; stamps : how it is written, None for numbers. unit : bytes of a
-    character, as numpy reads it.
+    headings of all columns. width : cells of a row, which may have empty ones beyond the last heading. text_columns :
+    columns that hold no numbers. clock : the column of time; time_stamps : how it is written, None for numbers. unit :
+    bytes of a character, as numpy reads it.
     """
 
     separator: str
@@ -50,20 +50,20 @@ class Layout:
     line: int
     names: tuple[str, ...]
     width: int
-    texts: tuple[int, ...]
+    text_columns: tuple[int, ...]
     clock: int
-    stamps: Stamps | None
+    time_stamps: Stamps | None
     unit: np.dtype
 
     @property
     def start(self) -> datetime | None:
         """Date and time at time 0; None where the rows do not give it."""
-        return self.stamps.start if self.stamps else None
+        return self.time_stamps.start if self.time_stamps else None
 
     @property
     def numbers(self) -> list[int]:
         """Columns that hold numbers."""
-        return [i for i in range(len(self.names)) if i not in self.texts]
+        return [i for i in range(len(self.names)) if i not in self.text_columns]
 
 
 def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
@@ -71,7 +71,7 @@ def one_byte_text(data: bytes, unit: np.dtype) -> bytes:
     if unit.itemsize == 1:
         return data
     codes = np.frombuffer(data[: len(data) // unit.itemsize * unit.itemsize], unit)
-    return np.where(codes > 127, ord(_WRONG), codes).astype(np.uint8).tobytes()
+    return np.where(codes > 127, ord(_QUOTED_SEPARATOR), codes).astype(np.uint8).tobytes()
 
 
 def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
@@ -81,10 +81,10 @@ def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
     marks, count, place, last = [begin], 0, begin, begin
     with path.open("rb") as file:
         file.seek(begin)
-        while chunk := file.read(CHUNK):
+        while chunk := file.read(BYTES_PER_READ):
             codes = np.frombuffer(chunk[: len(chunk) // size * size], layout.unit)
             ends = (np.flatnonzero(codes == ord("\n")) + 1) * size + place
-            marks += ends[(STRIDE - 1 - count) % STRIDE :: STRIDE].tolist()
+            marks += ends[(ROWS_PER_MARK - 1 - count) % ROWS_PER_MARK :: ROWS_PER_MARK].tolist()
             count, place = count + len(ends), place + len(chunk)
             last = int(ends[-1]) if len(ends) else last
     empty = _empty_lines(path, layout, last)
@@ -97,7 +97,7 @@ def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
 def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
     """Byte positions of the empty lines at the end of the file; only its last thousand characters are searched."""
     size = layout.unit.itemsize
-    begin = max(layout.begin, last - TAIL * size)
+    begin = max(layout.begin, last - TAIL_CHARACTERS * size)
     with path.open("rb") as file:
         file.seek(begin)
         tail = one_byte_text(file.read(last - begin), layout.unit)
@@ -107,18 +107,19 @@ def _empty_lines(path: Path, layout: Layout, last: int) -> list[int]:
     return [last + size * (i - len(tail)) for i in [first, *(end + 1 for end in ends[:-1])]] if ends else []
 
 
-def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.ndarray, np.ndarray | None]:
+def numbers_of_rows(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.ndarray, np.ndarray | None]:
     """Table (rows, columns of numbers) of some rows, from row ``first`` on; also the seconds (rows,) since the first
     stamp, if times are clock times."""
     line = layout.line + 1 + first
-    text = _unquoted(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
+    text = _without_quotes(path, layout, one_byte_text(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _refuse_uneven_row(path, layout, text, line)
     times = None
-    if layout.stamps is not None:
+    if layout.time_stamps is not None:
         stamps = [
-            cell.replace(_WRONG, layout.separator) for cell in _read_columns(layout, text, [layout.clock], str)[:, 0]
+            cell.replace(_QUOTED_SEPARATOR, layout.separator)
+            for cell in _read_columns(layout, text, [layout.clock], str)[:, 0]
         ]
-        times = layout.stamps.seconds(path, stamps, line, layout.names[layout.clock])
+        times = layout.time_stamps.seconds(path, stamps, line, layout.names[layout.clock])
     table, used = _table(path, layout, text, line), len(layout.numbers)
     beyond = np.isfinite(table[:, used:]).any(axis=1)
     if beyond.any():
@@ -131,15 +132,17 @@ def _table(path: Path, layout: Layout, text: bytes, line_number: int) -> np.ndar
     """Numbers (rows, columns) of the columns of numbers and of any beyond the last heading; NaN where a mark means "no
     value"."""
     columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
-    if text.translate(None, _PLAIN + layout.separator.encode()):
-        wrong = _culprit(path, layout, text, line_number)
+    if text.translate(None, _PLAIN_BYTES + layout.separator.encode()):
+        wrong = _first_wrong_cell(path, layout, text, line_number)
     if wrong is None:
         with suppress(ValueError, OverflowError):
             return _read_columns(layout, text, columns, np.float64)
         cells = np.unique(_read_columns(layout, text, columns, str).astype(str))
         with suppress(ValueError, OverflowError):
-            return _read_columns(layout, text, columns, np.float64, [cell for cell in cells if MARKS.fullmatch(cell)])
-        wrong = _culprit(path, layout, text, line_number)
+            return _read_columns(
+                layout, text, columns, np.float64, [cell for cell in cells if MISSING_VALUE_PATTERN.fullmatch(cell)]
+            )
+        wrong = _first_wrong_cell(path, layout, text, line_number)
     raise wrong or InputError(path, f"line {line_number} and after", None, "rows of numbers are needed")
 
 
@@ -156,7 +159,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
         usecols=columns,
         dtype=kind,
         keep_default_na=False,
-        na_values=[*_GAPS, *marks] if kind is np.float64 else [],
+        na_values=[*_GAP_CELLS, *marks] if kind is np.float64 else [],
         skip_blank_lines=False,
         skipinitialspace=True,
         quoting=csv.QUOTE_NONE,
@@ -164,7 +167,7 @@ def _read_columns(layout: Layout, text: bytes, columns: list[int], kind: type, m
     ).to_numpy()
 
 
-def _unquoted(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
+def _without_quotes(path: Path, layout: Layout, text: bytes, line_number: int) -> bytes:
     """Text of rows with quotes removed; a comma inside quotes is a decimal sign where numbers are written so."""
     if b'"' not in text:
         return text
@@ -176,7 +179,7 @@ def _unquoted(path: Path, layout: Layout, text: bytes, line_number: int) -> byte
         row = int(np.argmax(inside[ends]))
         raise _error_at_byte(path, line_number, text, int(ends[row]), "a quote is opened and not closed in this line")
     decimal = layout.separator == layout.decimal == ","
-    codes[inside & (codes == ord(layout.separator))] = ord("." if decimal else _WRONG)
+    codes[inside & (codes == ord(layout.separator))] = ord("." if decimal else _QUOTED_SEPARATOR)
     return codes[~quotes].tobytes()
 
 
@@ -196,12 +199,16 @@ def _refuse_uneven_row(path: Path, layout: Layout, text: bytes, line_number: int
         )
 
 
-def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
+def _first_wrong_cell(path: Path, layout: Layout, text: bytes, line_number: int) -> InputError | None:
     """Error at the first cell that is not a number, or has a tab in a time; None where there is none such."""
     comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)
-        time = cells[layout.clock].replace(_WRONG, ",") if layout.stamps and layout.clock < len(cells) else ""
+        time = (
+            cells[layout.clock].replace(_QUOTED_SEPARATOR, ",")
+            if layout.time_stamps and layout.clock < len(cells)
+            else ""
+        )
         if not time.isprintable():
             place = f"line {line_number + i}, column {layout.names[layout.clock]!r}"
             allowed = "a time is needed; a tab in it, or another sign that nobody sees, may stand for a lost digit"
@@ -209,7 +216,7 @@ def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> Input
         for column in (column for column in layout.numbers if column < len(cells)):
             cell = cells[column]
             try:
-                mark = MARKS.fullmatch(cell) is not None
+                mark = MISSING_VALUE_PATTERN.fullmatch(cell) is not None
                 mark or float(cell.replace(",", ".") if comma else cell)
                 number = (
                     cell.isascii() and cell.isprintable() and "_" not in cell and ("." if comma else ",") not in cell
@@ -218,13 +225,13 @@ def _culprit(path: Path, layout: Layout, text: bytes, line_number: int) -> Input
                 mark = number = False
             if not mark and not number:
                 place = f"line {line_number + i}, column {layout.names[column]!r}"
-                return InputError(path, place, cell.strip(), _remedy(layout, cell))
+                return InputError(path, place, cell.strip(), _cell_advice(layout, cell))
     return None
 
 
-def _remedy(layout: Layout, cell: str) -> str:
+def _cell_advice(layout: Layout, cell: str) -> str:
     """Advice on what to write instead of a cell that is not a number."""
-    if _THOUSANDS.fullmatch(cell):
+    if _THOUSANDS_PATTERN.fullmatch(cell):
         return "write numbers without separators of thousands"
     if ("." if layout.decimal == "," else ",") in cell:
         return f"the decimal sign is {layout.decimal!r} before this line: write all numbers in one way"

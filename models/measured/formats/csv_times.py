@@ -9,25 +9,27 @@ import numpy as np
 
 from models.core.errors import InputError
 
-CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9}))?"
-ZONE = r"(?P<zone>Z|[+-]\d{2}:?\d{2})?"
-FORMS = {
-    "hh:mm:ss.fff": re.compile(CLOCK),
-    "ISO 8601": re.compile(rf"(?P<y>\d{{4}})[-/](?P<o>\d{{1,2}})[-/](?P<d>\d{{1,2}})[ T]+{CLOCK} ?{ZONE}"),
-    "dd.mm.yyyy hh:mm:ss.fff": re.compile(rf"(?P<d>\d{{1,2}})\.(?P<o>\d{{1,2}})\.(?P<y>\d{{4}})[ T]+{CLOCK}"),
+CLOCK_PATTERN = r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9}))?"
+ZONE_PATTERN = r"(?P<zone>Z|[+-]\d{2}:?\d{2})?"
+TIME_NOTATIONS = {
+    "hh:mm:ss.fff": re.compile(CLOCK_PATTERN),
+    "ISO 8601": re.compile(
+        rf"(?P<y>\d{{4}})[-/](?P<o>\d{{1,2}})[-/](?P<d>\d{{1,2}})[ T]+{CLOCK_PATTERN} ?{ZONE_PATTERN}"
+    ),
+    "dd.mm.yyyy hh:mm:ss.fff": re.compile(rf"(?P<d>\d{{1,2}})\.(?P<o>\d{{1,2}})\.(?P<y>\d{{4}})[ T]+{CLOCK_PATTERN}"),
 }
 """Notations that have one meaning."""
-DAY = 86_400_000_000_000
+DAY_IN_NANOSECONDS = 86_400_000_000_000
 """ns."""
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """Times of the clock, all in one notation; ``zero`` is the first time, in ns since 1970 or since midnight."""
+    """Times of the clock, all in one notation; ``first_time`` is the first time, in ns since 1970 or since midnight."""
 
-    form: str
+    notation: str
     zone: str
-    zero: int
+    first_time: int
     first: str
 
     @property
@@ -35,7 +37,7 @@ class Stamps:
         """Date and time at time 0; None where the file names no time zone."""
         if not self.zone:
             return None
-        text = str(np.datetime64(self.zero, "ns").astype("datetime64[us]"))
+        text = str(np.datetime64(self.first_time, "ns").astype("datetime64[us]"))
         return datetime.fromisoformat(text + self.zone.replace("Z", "+00:00"))
 
     def seconds(self, path: Path, cells: list[str], line_number: int, name: str) -> np.ndarray:
@@ -46,18 +48,18 @@ class Stamps:
         try:
             stamps = np.array([self._cell_for_numpy(cell) for cell in cells], "datetime64[ns]").astype(np.int64)
         except (ValueError, TypeError):
-            raise self._culprit(path, cells, line_number, name) from None
-        passed = stamps - self.zero
-        return np.asarray((passed % DAY if self.form == "hh:mm:ss.fff" else passed) / 1e9)
+            raise self._first_wrong_cell(path, cells, line_number, name) from None
+        passed = stamps - self.first_time
+        return np.asarray((passed % DAY_IN_NANOSECONDS if self.notation == "hh:mm:ss.fff" else passed) / 1e9)
 
     def _cell_for_numpy(self, cell: str) -> str:
         """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
-        matched = FORMS[self.form].fullmatch(cell.strip())
+        matched = TIME_NOTATIONS[self.notation].fullmatch(cell.strip())
         if matched is None or (matched.groupdict().get("zone") or "") != self.zone:
             raise ValueError(cell)
-        return _iso(matched)
+        return _iso_text(matched)
 
-    def _culprit(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
+    def _first_wrong_cell(self, path: Path, cells: list[str], line_number: int, name: str) -> InputError:
         """Error at the first cell that is no time in this notation."""
         for i, cell in enumerate(cells):
             try:
@@ -68,7 +70,7 @@ class Stamps:
                     path,
                     f"line {line_number + i}, column {name!r}",
                     cell.strip(),
-                    f"a time such as {self.first} is needed ({self.form}{where}, as in the first row)",
+                    f"a time such as {self.first} is needed ({self.notation}{where}, as in the first row)",
                 )
         return InputError(path, f"line {line_number} and after, column {name!r}", None, "times of the clock are needed")
 
@@ -77,14 +79,14 @@ def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
     """Notation of a column of times, from its first cell; InputError, with advice, where the cell can be read in two
     ways."""
     cell = cell.strip()
-    for form, pattern in FORMS.items():
+    for form, pattern in TIME_NOTATIONS.items():
         matched = pattern.fullmatch(cell)
         if matched is not None:
             plain = Stamps(form, matched.groupdict().get("zone") or "", 0, cell)
             try:
-                zero = int(np.datetime64(_iso(matched), "ns").astype(np.int64))
+                zero = int(np.datetime64(_iso_text(matched), "ns").astype(np.int64))
             except ValueError:
-                raise plain._culprit(path, [cell], line_number, name) from None
+                raise plain._first_wrong_cell(path, [cell], line_number, name) from None
             return Stamps(form, plain.zone, zero, cell)
     raise InputError(
         path,
@@ -95,7 +97,7 @@ def find_stamps(path: Path, cell: str, line_number: int, name: str) -> Stamps:
     )
 
 
-def _iso(matched: re.Match[str]) -> str:
+def _iso_text(matched: re.Match[str]) -> str:
     part = matched.groupdict()
     year, month, day = (part.get("y") or "1970", part.get("o") or "01", part.get("d") or "01")
     return f"{year}-{month:0>2}-{day:0>2}T{part['h']:0>2}:{part['m']}:{part['s']}.{part['f'] or '0'}"

@@ -25,42 +25,50 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.mdf4_blocks import VLSD, check_blocks
-from models.measured.formats.opened import LeftOut, Opened, Span, distinct_names, notice, readable, without_numbers
+from models.measured.formats.mdf4_blocks import VARIABLE_LENGTH_FLAG, check_blocks
+from models.measured.formats.opened import (
+    LeftOut,
+    OpenFile,
+    Span,
+    distinct_names,
+    flaw_finding,
+    library_errors_as_input,
+    without_numbers,
+)
 
-SECONDS = 1
+SECONDS_SYNCHRONISATION = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
-CLOCKS = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+SECONDS_OF_UNIT = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 """s, of the units of a master channel that some exporters write beside the standard's own."""
-ALL_INVALID, INVALIDATION, VIRTUAL_MASTER = 1, 2, 3
+ALL_INVALID, INVALIDATION_FLAGS, VIRTUAL_MASTER = 1, 2, 3
 """Flags of a channel of MDF 4 that was never measured, and of one with marks; kind of a clock without samples."""
-LOCAL, OFFSET = 1, 2
+LOCAL_TIME_FLAG, OFFSET_VALID_FLAG = 1, 2
 """Flags of the start in MDF 4: local time of an unknown zone, offset to UTC is valid."""
-PLAIN = {3: {0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
-WHOLE = {3: {0, 1, 9, 10, 13, 14}, 4: {0, 1, 2, 3}}
-CONVERSIONS = {3: {0, 1, 2, 6, 7, 8, 9, 10, 65535}, 4: {0, 1, 2, 3, 4, 5, 6}}
-LINEAR = {3: 0, 4: 1}
+NUMBER_TYPES = {3: {0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
+WHOLE_NUMBER_TYPES = {3: {0, 1, 9, 10, 13, 14}, 4: {0, 1, 2, 3}}
+NUMERIC_CONVERSIONS = {3: {0, 1, 2, 6, 7, 8, 9, 10, 65535}, 4: {0, 1, 2, 3, 4, 5, 6}}
+LINEAR_CONVERSION = {3: 0, 4: 1}
 """By version: data types of numbers, those of whole numbers, conversions that end in numbers, the linear one."""
 
 
 @dataclass(frozen=True)
-class MdfFile(Opened):
+class MdfFile(OpenFile):
     """A reader of an MDF file; ``places`` holds the group and index of every channel in the file."""
 
     places: tuple[tuple[int, int], ...]
 
     def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Load the records of each span once, and take every channel from them."""
-        with opened(self.path) as mdf:
+        with opened_mdf(self.path) as mdf:
             group = self.places[channel_indices[0]][0]
             for first, count in spans:
-                with unheard():
-                    block = _block(mdf, group, [self.places[i][1] for i in channel_indices], first, count)
+                with suppressed_output():
+                    block = _record_block(mdf, group, [self.places[i][1] for i in channel_indices], first, count)
                 yield block
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def opened_mdf(path: Path) -> Iterator[Any]:
     """asammdf's open file, with its terminal output suppressed; InputError where the file is damaged or the package
     missing."""
     try:
@@ -70,7 +78,7 @@ def opened(path: Path) -> Iterator[Any]:
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     with path.open("rb") as file:  # a path would be mapped into memory as a whole
         mdf, why = None, ""
-        with unheard():
+        with suppressed_output():
             try:
                 mdf = MDF(file)
             except Exception as error:
@@ -87,7 +95,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 @contextmanager
-def unheard() -> Iterator[None]:
+def suppressed_output() -> Iterator[None]:
     """Suppress what asammdf prints, also while it cleans up a file that it could not open."""
     kept, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
@@ -97,18 +105,20 @@ def unheard() -> Iterator[None]:
         sys.unraisablehook = kept
 
 
-def _block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _record_block(mdf: Any, group: int, indices: list[int], first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times and values of some records, loaded only once; the library's public functions would load them again for each
     channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
     parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
     unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
-    times = CLOCKS.get(unit.strip(), 1.0) * np.concatenate([mdf.get_master(group, data=part) for part in parts])
-    values = [np.concatenate([_values(mdf, group, i, part) for part in parts]) for i in indices]
+    times = SECONDS_OF_UNIT.get(unit.strip(), 1.0) * np.concatenate(
+        [mdf.get_master(group, data=part) for part in parts]
+    )
+    values = [np.concatenate([_physical_values(mdf, group, i, part) for part in parts]) for i in indices]
     return times[:count], np.column_stack(values)[:count]
 
 
-def _values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
+def _physical_values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
     """Physical values (n,) of one channel in some records; NaN where they are marked as invalid.
 
     What the library calls to ignore the marks is to hand them over; it would leave out the samples otherwise.
@@ -120,18 +130,18 @@ def _values(mdf: Any, group: int, index: int, records: Any) -> np.ndarray:
 
 def open_mdf(path: Path) -> MdfFile:
     """List the channels of a file; raises InputError where it is damaged."""
-    with readable(path):
+    with library_errors_as_input(path):
         with path.open("rb") as file:
             identification = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
         if identification is None:
             raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
         version = int(identification[1])
         findings = check_blocks(path) if version == 4 else []
-        with opened(path) as mdf:
-            return _listed(path, mdf, version, findings)
+        with opened_mdf(path) as mdf:
+            return _file_with_channels(path, mdf, version, findings)
 
 
-def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
+def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
     """Channels that hold numbers over time."""
     left, places, channels = LeftOut(), [], []
     for g, group in enumerate(mdf.groups):
@@ -156,33 +166,37 @@ def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfF
     findings = findings + left.findings(path)
     if not places:
         raise without_numbers(path, findings)
-    groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
+    groups = [
+        _group_names(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)
+    ]
     names, repeated = distinct_names(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
         Channel(
             name,
             channel.unit or "",
-            _plain(channel.comment),
+            _plain_comment(channel.comment),
             g,
             mdf.groups[g].channel_group.cycles_nr,
             None,
-            _resolution(channel, version),
+            _value_step(channel, version),
             next(filter(None, texts), ""),
         )
         for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
     )
     start, notes = _start_time(path, mdf.header, version)
-    return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(findings + repeated + notes), tuple(places))
+    return MdfFile(
+        path, listed, start, _plain_comment(mdf.header.comment), tuple(findings + repeated + notes), tuple(places)
+    )
 
 
-def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
+def _group_names(group: Any, channel: Any) -> tuple[str, str, str, str]:
     """Texts that can serve as the name of a channel's group: acquisition name, source, first comment line, channel's
     source."""
     sources = [
         f"{getattr(source, 'name', '')} {getattr(source, 'path', '')}".strip()
         for source in (getattr(group, "acq_source", None), getattr(channel, "source", None))
     ]
-    comment = _plain(group.comment or "").partition("\n")[0]
+    comment = _plain_comment(group.comment or "").partition("\n")[0]
     return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
 
 
@@ -191,11 +205,11 @@ def _why_group_unusable(mdf: Any, g: int, version: int) -> str:
     group, master = mdf.groups[g], mdf.masters_db.get(g)
     if group.channel_group.cycles_nr == 0:
         return "no samples"
-    if version == 4 and group.channel_group.flags & VLSD:
+    if version == 4 and group.channel_group.flags & VARIABLE_LENGTH_FLAG:
         return "records with lengths of their own"
     if master is None:
         return "no clock"
-    if version == 4 and group.channels[master].sync_type != SECONDS:
+    if version == 4 and group.channels[master].sync_type != SECONDS_SYNCHRONISATION:
         return "its clock does not count seconds"
     return "" if _bits_within_record(group, group.channels[master], version) else "its clock lies outside the records"
 
@@ -206,7 +220,11 @@ def _why_channel_unusable(group: Any, i: int, version: int) -> str:
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
     if version == 4 and channel.flags & ALL_INVALID:
         return "marked as invalid by the recorder"
-    numbers = channel.channel_type == 0 and channel.data_type in PLAIN[version] and conversion in CONVERSIONS[version]
+    numbers = (
+        channel.channel_type == 0
+        and channel.data_type in NUMBER_TYPES[version]
+        and conversion in NUMERIC_CONVERSIONS[version]
+    )
     if not numbers or group.channel_dependencies[i]:
         return "no numbers"
     return "" if _bits_within_record(group, channel, version) else "bits outside the records (a damaged file has such)"
@@ -215,12 +233,12 @@ def _why_channel_unusable(group: Any, i: int, version: int) -> str:
 def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
     """Whether a channel's bits lie inside its records. The library copies without this check and could crash the
     process."""
-    records, whole = group.channel_group, channel.data_type in WHOLE[version]
+    records, whole = group.channel_group, channel.data_type in WHOLE_NUMBER_TYPES[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
     begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else channel.start_offset
     begin += 8 * getattr(channel, "additional_byte_offset", 0) if version == 3 else 0
-    marked = version == 4 and channel.flags & INVALIDATION
+    marked = version == 4 and channel.flags & INVALIDATION_FLAGS
     return (
         0 <= begin <= begin + channel.bit_count <= 8 * records.samples_byte_nr
         and (0 < channel.bit_count <= 64 if whole else begin % 8 == 0 and channel.bit_count in (16, 32, 64))
@@ -228,18 +246,18 @@ def _bits_within_record(group: Any, channel: Any, version: int) -> bool:
     )
 
 
-def _resolution(channel: Any, version: int) -> float:
+def _value_step(channel: Any, version: int) -> float:
     """Step between values of a channel stored as whole numbers, in its unit; 0 for floating-point values and nonlinear
     conversions."""
-    if channel.data_type not in WHOLE[version]:
+    if channel.data_type not in WHOLE_NUMBER_TYPES[version]:
         return 0.0
     conversion = channel.conversion
     if conversion is None or conversion.conversion_type == (0 if version == 4 else 65535):
         return 1.0
-    return abs(float(conversion.a)) if conversion.conversion_type == LINEAR[version] else 0.0
+    return abs(float(conversion.a)) if conversion.conversion_type == LINEAR_CONVERSION[version] else 0.0
 
 
-def _plain(comment: str) -> str:
+def _plain_comment(comment: str) -> str:
     """Text of a comment without XML tags."""
     if not comment.lstrip().startswith("<"):
         return comment.strip()
@@ -253,13 +271,13 @@ def _plain(comment: str) -> str:
 def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None, list[Finding]]:
     """Date and time at time 0; None, with a finding, where the file does not give the time zone."""
     if not getattr(header, "abs_time", 0):
-        return None, [notice(path, "note", "the file does not say when it was measured")]
-    if version == 4 and header.time_flags & LOCAL:
+        return None, [flaw_finding(path, "note", "the file does not say when it was measured")]
+    if version == 4 and header.time_flags & LOCAL_TIME_FLAG:
         clock = datetime.fromtimestamp(header.abs_time / 1e9, UTC)
         text = f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the file does not name, and is not used"
-        return None, [notice(path, "doubt", text)]
+        return None, [flaw_finding(path, "doubt", text)]
     minutes = 60 * header.tz_offset if version == 3 else 0
-    if version == 4 and header.time_flags & OFFSET:
+    if version == 4 and header.time_flags & OFFSET_VALID_FLAG:
         minutes = header.tz_offset + header.daylight_save_time
     whole, part = divmod(header.abs_time, 10**9)
     zone = timezone(timedelta(minutes=minutes))

@@ -12,15 +12,28 @@ from pathlib import Path
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.measured.formats.opened import notice
+from models.measured.formats.opened import flaw_finding
 
 HEAD_BYTES, FIRST_BLOCK_OFFSET = 24, 64
 """Bytes of a block's head; where the first block, HD, begins."""
-CHAINED = (b"##DG", b"##CG", b"##CN", b"##DL", b"##LD", b"##EV", b"##AT", b"##CH", b"##FH", b"##SR", b"##CC", b"##HL")
+CHAINED_BLOCKS = (
+    b"##DG",
+    b"##CG",
+    b"##CN",
+    b"##DL",
+    b"##LD",
+    b"##EV",
+    b"##AT",
+    b"##CH",
+    b"##FH",
+    b"##SR",
+    b"##CC",
+    b"##HL",
+)
 """Blocks whose first link leads on to the next of their kind, or into their list."""
-PACKING = 1100
+LARGEST_COMPRESSION = 1100
 """Times that packed data may grow: beyond what deflate can do."""
-VLSD = 1
+VARIABLE_LENGTH_FLAG = 1
 """Flag of a channel group whose records have lengths of their own."""
 
 
@@ -47,9 +60,9 @@ def check_blocks(path: Path) -> list[Finding]:
         blocks = dict(_linked_blocks(path, data, size))
         if blocks[FIRST_BLOCK_OFFSET].kind != b"##HD":
             raise InputError(path, f"byte {FIRST_BLOCK_OFFSET}", None, "the header block ##HD is needed")
-    _chains(path, blocks)
+    _check_chains(path, blocks)
     groups = [(place, block) for place, block in blocks.items() if block.kind == b"##DG"]
-    return [finding for place, block in groups for finding in _records(path, place, block, blocks)]
+    return [finding for place, block in groups for finding in _check_records(path, place, block, blocks)]
 
 
 def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, MdfBlock]]:
@@ -75,12 +88,12 @@ def _linked_blocks(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int
         ahead += sorted(new)
 
 
-def _chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
+def _check_chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
     """Refuse a chain of links that leads back to one of its own blocks."""
     ended: set[int] = set()
     for place in blocks:
         chain: dict[int, None] = {}
-        while place and place not in ended and blocks[place].kind in CHAINED and blocks[place].links:
+        while place and place not in ended and blocks[place].kind in CHAINED_BLOCKS and blocks[place].links:
             if place in chain:
                 raise InputError(path, f"byte {place}", None, "a chain of blocks leads back to this one")
             chain[place] = None
@@ -88,29 +101,29 @@ def _chains(path: Path, blocks: dict[int, MdfBlock]) -> None:
         ended |= set(chain)
 
 
-def _records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
+def _check_records(path: Path, place: int, group: MdfBlock, blocks: dict[int, MdfBlock]) -> list[Finding]:
     """Refuse channel groups that announce more records than their data group has bytes for; return findings where it
     has more bytes."""
-    there = sum(_length(path, at, blocks) for at in _data(path, group.links[2], blocks))
+    there = sum(_length(path, at, blocks) for at in _data_positions(path, group.links[2], blocks))
     id_size = group.data[0]
     needed, loose, at = 0, False, group.links[1]
     while at:
         block = blocks[at]
         _, cycles, flags = struct.unpack_from("<QQH", block.data)
         record_size = sum(struct.unpack_from("<II", block.data, 24))
-        loose |= bool(flags & VLSD)
-        needed += 0 if flags & VLSD else cycles * (record_size + id_size)
+        loose |= bool(flags & VARIABLE_LENGTH_FLAG)
+        needed += 0 if flags & VARIABLE_LENGTH_FLAG else cycles * (record_size + id_size)
         at = block.links[0]
     if needed > there:
         allowed = f"the records of this data group need {needed} bytes, and {there} are there"
         raise InputError(path, f"byte {place}", None, allowed)
     if needed < there and not loose:
         text = f"the data group at byte {place} has {there} bytes of records; {needed} are announced and read"
-        return [notice(path, "doubt", text)]
+        return [flaw_finding(path, "doubt", text)]
     return []
 
 
-def _data(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
+def _data_positions(path: Path, place: int, blocks: dict[int, MdfBlock]) -> list[int]:
     """Positions of the data blocks that a link leads to, directly or through a list."""
     places, ahead = list[int](), [place]
     while ahead:
@@ -130,6 +143,6 @@ def _length(path: Path, place: int, blocks: dict[int, MdfBlock]) -> int:
     if block.kind != b"##DZ":
         return block.length - HEAD_BYTES - 8 * len(block.links)
     plain, packed = struct.unpack_from("<QQ", block.data, 8)
-    if plain > PACKING * packed + HEAD_BYTES:
+    if plain > LARGEST_COMPRESSION * packed + HEAD_BYTES:
         raise InputError(path, f"byte {place}", plain, f"{packed} packed bytes cannot hold as many")
     return int(plain)

@@ -14,18 +14,18 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
-from models.measured.channel import BLOCK, Channel, SampleBlock
+from models.measured.channel import SAMPLES_PER_BLOCK, Channel, SampleBlock
 
 Span = tuple[int, int]
 """First sample and number of samples."""
 SHOWN_NAMES = 5
 """Names of what is left out that are told."""
-DATED = "2026-11-21T08:00:00+00:00"
+START_EXAMPLE = "2026-11-21T08:00:00+00:00"
 """How a start is to be written."""
 
 
 @dataclass(frozen=True)
-class Opened(ABC):
+class OpenFile(ABC):
     """An open file with known channels. Samples are read on demand, and no file handle stays open between reads."""
 
     path: Path
@@ -34,7 +34,7 @@ class Opened(ABC):
     comment: str
     noticed: tuple[Finding, ...]
 
-    def blocks(self, names: Sequence[str], length: int = BLOCK, first: int = 0) -> Iterator[SampleBlock]:
+    def blocks(self, names: Sequence[str], length: int = SAMPLES_PER_BLOCK, first: int = 0) -> Iterator[SampleBlock]:
         """Blocks of channels of one group, as specified in ``models.measured.channel.Source``."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
@@ -60,7 +60,7 @@ class Opened(ABC):
     def _checked(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[SampleBlock]:
         """Blocks that are complete, with times and values that are numbers or NaN."""
         names, (mine, theirs) = [self.channels[i].name for i in channel_indices], tee(spans)
-        with readable(self.path):
+        with library_errors_as_input(self.path):
             for (first, count), (times, values) in zip(mine, self.pieces(channel_indices, theirs), strict=True):
                 if len(times) != count:
                     ends = f"the data end here, although {first + count} samples or more are announced"
@@ -82,7 +82,7 @@ class Opened(ABC):
 
 
 @contextmanager
-def readable(path: Path) -> Iterator[None]:
+def library_errors_as_input(path: Path) -> Iterator[None]:
     """Convert any exception that a library raises on a damaged file into an InputError with one message."""
     try:
         yield
@@ -95,7 +95,7 @@ def readable(path: Path) -> Iterator[None]:
         raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})") from error
 
 
-def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
+def flaw_finding(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
     """Finding on a flaw in a file that could be read nevertheless."""
     return Finding("file", weight, place or path.name, text)
 
@@ -118,7 +118,7 @@ class LeftOut:
             if len(names) > SHOWN_NAMES
         }
         texts = {why: f"{', '.join(names[:SHOWN_NAMES])}{more.get(why, '')}" for why, names in self.names.items()}
-        return [notice(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
+        return [flaw_finding(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 
 def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
@@ -145,7 +145,7 @@ def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> 
     for name, places in repeated.items():
         weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in places) else "note"
         text = f"{len(places)} channels are called {name!r}: they are read as "
-        said.append(notice(path, weight, text + ", ".join(repr(unique[i]) for i in places), name))
+        said.append(flaw_finding(path, weight, text + ", ".join(repr(unique[i]) for i in places), name))
     return unique, said
 
 
@@ -161,14 +161,14 @@ def _number_repeated(names: Sequence[str]) -> list[str]:
     return unique
 
 
-def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
+def start_with_zone(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
     """Start time from ISO 8601 text; None, with a finding, where the text is no date or has no time zone."""
     try:
         start = datetime.fromisoformat(text.strip())
     except ValueError:
-        wrong = f"is not a date such as {DATED}, and is not used"
+        wrong = f"is not a date such as {START_EXAMPLE}, and is not used"
     else:
         if start.tzinfo is not None:
             return start, []
-        wrong = f"names no time zone, and is not used: write it as {DATED}"
-    return None, [notice(path, "doubt", f"the start {text.strip()!r} {wrong}")]
+        wrong = f"names no time zone, and is not used: write it as {START_EXAMPLE}"
+    return None, [flaw_finding(path, "doubt", f"the start {text.strip()!r} {wrong}")]

@@ -17,15 +17,22 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.opened import Opened, Span, distinct_names, notice, readable, zoned
+from models.measured.formats.opened import (
+    OpenFile,
+    Span,
+    distinct_names,
+    flaw_finding,
+    library_errors_as_input,
+    start_with_zone,
+)
 
-BLOCK, KEY, RECORD = 512, 32, 128
+HEADER_BLOCK, KEY_LENGTH, RECORD_LENGTH = 512, 32, 128
 MOST_BLOCKS = 1024
 """Header blocks: four times what the format allows, as there are files that need them."""
-TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
+SAMPLE_TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
 LITTLE_ENDIAN = ("BINARY", "BINARY_IEEE_LITTLE_END")
-BEGINS = ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]
-HISTORIES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
+FIRST_PARAMETERS = ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]
+HISTORY_TYPES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class RpcFile(Opened):
+class RpcFile(OpenFile):
     """Groups of equal length, read through a memory window of the file."""
 
     layout: Layout
@@ -67,15 +74,15 @@ class RpcFile(Opened):
 
 def open_rpc(path: Path) -> RpcFile:
     """Read the header, and compare it with the length of the file; raises InputError."""
-    with readable(path):
+    with library_errors_as_input(path):
         parameters = read_parameters(path)
-        layout = _layout(path, parameters)
-        count, said = _count(path, parameters, layout)
+        layout = _sample_layout(path, parameters)
+        count, said = _usable_samples(path, parameters, layout)
         said += _numbers_of_names(path, parameters, layout.width)
         numbers = range(1, layout.width + 1)
         names = [parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}" for i in numbers]
         names, repeated = distinct_names(path, names)
-        steps = np.abs(layout.scales) if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
+        steps = np.abs(layout.scales) if layout.dtype == SAMPLE_TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
         channels = tuple(
             Channel(
                 name,
@@ -88,7 +95,7 @@ def open_rpc(path: Path) -> RpcFile:
             )
             for name, i, step in zip(names, numbers, steps, strict=True)
         )
-        start, notes = zoned(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
+        start, notes = start_with_zone(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
         return RpcFile(
             path, channels, start, _join_long_text(parameters, "COMMENT"), (*said, *repeated, *notes), layout
         )
@@ -97,27 +104,27 @@ def open_rpc(path: Path) -> RpcFile:
 def read_parameters(path: Path) -> dict[str, str]:
     """Parameters of the header by name; the first three have fixed positions and give the number of the others."""
     with path.open("rb") as file:
-        head = file.read(BLOCK)
-        if len(head) < BLOCK:
+        head = file.read(HEADER_BLOCK)
+        if len(head) < HEADER_BLOCK:
             raise InputError(path, f"byte {len(head)}", None, "the file ends in its header")
-        first = dict(_record(head, i) for i in range(3))
-        if list(first) != BEGINS:
-            text = f"RPC III begins with {', '.join(BEGINS[:2])} and {BEGINS[2]}"
+        first = dict(_header_record(head, i) for i in range(3))
+        if list(first) != FIRST_PARAMETERS:
+            text = f"RPC III begins with {', '.join(FIRST_PARAMETERS[:2])} and {FIRST_PARAMETERS[2]}"
             raise InputError(path, "header", list(first), text)
         if first["FORMAT"] not in LITTLE_ENDIAN:
             raise InputError(path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE_ENDIAN)} can be read")
         blocks = whole_number(path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
         count = whole_number(path, first, "NUM_PARAMS", 4 * blocks)
-        head += file.read(BLOCK * (blocks - 1))
-    if len(head) < BLOCK * blocks:
+        head += file.read(HEADER_BLOCK * (blocks - 1))
+    if len(head) < HEADER_BLOCK * blocks:
         raise InputError(path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
-    return dict(_record(head, i) for i in range(count))
+    return dict(_header_record(head, i) for i in range(count))
 
 
-def _record(record_bytes: bytes, i: int) -> tuple[str, str]:
+def _header_record(record_bytes: bytes, i: int) -> tuple[str, str]:
     """Name and value of one header parameter; both are ended by a zero byte."""
-    record = record_bytes[i * RECORD : (i + 1) * RECORD]
-    key, value = (part.split(b"\0")[0] for part in (record[:KEY], record[KEY:]))
+    record = record_bytes[i * RECORD_LENGTH : (i + 1) * RECORD_LENGTH]
+    key, value = (part.split(b"\0")[0] for part in (record[:KEY_LENGTH], record[KEY_LENGTH:]))
     try:
         return key.decode("utf-8").strip(), value.decode("utf-8")
     except UnicodeDecodeError:
@@ -132,7 +139,7 @@ def whole_number(path: Path, parameters: dict[str, str], name: str, maximum: int
     return int(text.split(".")[0])
 
 
-def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
+def _real_parameter(path: Path, parameters: dict[str, str], name: str, positive: bool) -> float:
     """A parameter that must be a finite number."""
     try:
         value = float(parameters.get(name, ""))
@@ -144,27 +151,31 @@ def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> 
     return value
 
 
-def _layout(path: Path, parameters: dict[str, str]) -> Layout:
+def _sample_layout(path: Path, parameters: dict[str, str]) -> Layout:
     """Layout of the samples in the file: blocks, channels, bytes."""
-    for name, allowed in (("FILE_TYPE", ("TIME_HISTORY",)), ("TIME_TYPE", HISTORIES), ("DATA_TYPE", tuple(TYPES))):
+    for name, allowed in (
+        ("FILE_TYPE", ("TIME_HISTORY",)),
+        ("TIME_TYPE", HISTORY_TYPES),
+        ("DATA_TYPE", tuple(SAMPLE_TYPES)),
+    ):
         type_of_file = parameters.get(name, allowed[0]).strip()
         if type_of_file not in allowed:
             raise InputError(
                 path, f"header, {name}", type_of_file, "only time histories of one of these can be read", allowed
             )
-    dtype = TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
+    dtype = SAMPLE_TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
     width = whole_number(path, parameters, "CHANNELS", 10**4)
     points = whole_number(path, parameters, "PTS_PER_GROUP", 10**7)
     if points % whole_number(path, parameters, "PTS_PER_FRAME", points):
         raise InputError(path, "header, PTS_PER_GROUP", points, "a group must hold whole frames")
-    period = _real(path, parameters, "DELTA_T", True)
+    period = _real_parameter(path, parameters, "DELTA_T", True)
     scales = np.ones(width)
-    if dtype == TYPES["SHORT_INTEGER"]:
-        scales = np.array([_real(path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)])
-    return Layout(BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period)
+    if dtype == SAMPLE_TYPES["SHORT_INTEGER"]:
+        scales = np.array([_real_parameter(path, parameters, f"SCALE.CHAN_{i}", False) for i in range(1, width + 1)])
+    return Layout(HEADER_BLOCK * int(float(parameters["NUM_HEADER_BLOCKS"])), points, width, dtype, scales, period)
 
 
-def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
+def _usable_samples(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int, list[Finding]]:
     """Number of usable samples, and findings on missing or surplus ones."""
     frame = whole_number(path, parameters, "PTS_PER_FRAME", layout.points)
     announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
@@ -188,7 +199,7 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
         )
     if extra > 0:
         texts.append(f"{extra} bytes follow the samples that the header announces, unread")
-    return count, [notice(path, "doubt", text) for text in texts]
+    return count, [flaw_finding(path, "doubt", text) for text in texts]
 
 
 def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
@@ -197,7 +208,7 @@ def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> lis
     if numbers and max(numbers) > width:
         raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
     unnamed = [str(i) for i in range(1, width + 1) if i not in numbers]
-    return [notice(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
+    return [flaw_finding(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
 
 
 def _join_long_text(parameters: dict[str, str], name: str) -> str:

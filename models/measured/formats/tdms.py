@@ -19,14 +19,22 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.opened import LeftOut, Opened, Span, distinct_names, notice, readable, without_numbers
+from models.measured.formats.opened import (
+    LeftOut,
+    OpenFile,
+    Span,
+    distinct_names,
+    flaw_finding,
+    library_errors_as_input,
+    without_numbers,
+)
 
-UNITS = ("unit_string", "NI_UnitDescription")
-CLOCKS = ("time", "zeit", "t")
-SECONDS = ("", "s", "sec", "seconds")
-LEAD, OPEN_END = 28, 2**64 - 1
+UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+TIME_CHANNEL_NAMES = ("time", "zeit", "t")
+SECOND_SPELLINGS = ("", "s", "sec", "seconds")
+LEAD_IN_LENGTH, OPEN_END = 28, 2**64 - 1
 """Bytes that lead in a segment, and the length of a segment that its writer never finished."""
-EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
+TDMS_EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 """Where TDMS counts from: a start on this day is one that nobody set."""
 
 
@@ -43,7 +51,7 @@ class ChannelLocation:
 
 
 @dataclass(frozen=True)
-class TdmsData(Opened):
+class TdmsData(OpenFile):
     """Reader of a TDMS file with the location of every channel."""
 
     places: tuple[ChannelLocation, ...]
@@ -51,8 +59,8 @@ class TdmsData(Opened):
     def pieces(self, channel_indices: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the samples of each span, separately for each channel."""
         places = [self.places[i] for i in channel_indices]
-        with Bounded(self.path) as file:
-            data = opened(self.path, file)
+        with BoundedFile(self.path) as file:
+            data = opened_tdms(self.path, file)
             for first, count in spans:
                 values = [np.asarray(data[each.group][each.name].read_data(first, count), float) for each in places]
                 least = min(len(column) for column in values)
@@ -63,7 +71,7 @@ class TdmsData(Opened):
                 yield place.first + times, np.column_stack([column[:least] for column in values])
 
 
-class Bounded(io.BufferedReader):
+class BoundedFile(io.BufferedReader):
     """A file whose reads never allocate more memory than the file's size, since a damaged length field may claim
     gigabytes."""
 
@@ -76,7 +84,7 @@ class Bounded(io.BufferedReader):
         return super().read(size if size is None or size < 0 else min(size, max(self.size - self.tell(), 0)))
 
 
-def opened(path: Path, file: Bounded) -> Any:
+def opened_tdms(path: Path, file: BoundedFile) -> Any:
     """npTDMS's open file, with its terminal output suppressed; InputError where the package is missing."""
     try:
         from nptdms import TdmsFile
@@ -89,10 +97,10 @@ def opened(path: Path, file: Bounded) -> Any:
 
 def open_tdms(path: Path) -> TdmsData:
     """List the channels of a file; raises InputError where it is damaged."""
-    with readable(path):
+    with library_errors_as_input(path):
         cut = check_segments(path)
-        with Bounded(path) as file:
-            return _listed(path, opened(path, file), cut)
+        with BoundedFile(path) as file:
+            return _file_with_channels(path, opened_tdms(path, file), cut)
 
 
 def check_segments(path: Path) -> list[Finding]:
@@ -101,33 +109,33 @@ def check_segments(path: Path) -> list[Finding]:
     with path.open("rb") as file:
         while place < size:
             file.seek(place)
-            lead = file.read(LEAD)
+            lead = file.read(LEAD_IN_LENGTH)
             if not b"TDSm".startswith(lead[:4]):
                 raise InputError(path, f"byte {place}", lead[:4].hex(" "), "a segment of TDMS must begin here")
-            if len(lead) < LEAD:
-                return [_cut(path, place)]
+            if len(lead) < LEAD_IN_LENGTH:
+                return [_cut_off_finding(path, place)]
             order = ">" if lead[4] & 0x40 else "<"
             following, raw = struct.unpack(order + "QQ", lead[12:])
-            if following == OPEN_END or place + LEAD + following > size:
-                if place == 0 and LEAD + raw > size:
+            if following == OPEN_END or place + LEAD_IN_LENGTH + following > size:
+                if place == 0 and LEAD_IN_LENGTH + raw > size:
                     raise InputError(path, f"byte {size}", None, "the file ends before its first samples")
-                return [_cut(path, place)]
+                return [_cut_off_finding(path, place)]
             if raw > following:
                 raise InputError(path, f"byte {place + 20}", raw, "the samples begin after the end of their segment")
-            place += LEAD + following
+            place += LEAD_IN_LENGTH + following
     return []
 
 
-def _cut(path: Path, offset: int) -> Finding:
-    return notice(
+def _cut_off_finding(path: Path, offset: int) -> Finding:
+    return flaw_finding(
         path, "doubt", f"the segment at byte {offset} is not complete: the file is cut off, and what is whole is read"
     )
 
 
-def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
+def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     """Channels that hold numbers over time; channels with the same time axis form a group."""
     left = LeftOut()
-    usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
+    usable = [(group, channel) for group in data.groups() for channel in group.channels() if _is_numeric(channel, left)]
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
     zero = min((start for _, channel in usable if (start := _start_in_utc(channel)) is not None), default=None)
@@ -150,12 +158,12 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     channels = tuple(
         Channel(
             name,
-            _text(channel, *UNITS),
+            _text(channel, *UNIT_PROPERTIES),
             _text(channel, "description"),
             keys.index(key),
             key[1],
             None if place.clock else place.increment,
-            _resolution(channel),
+            _value_step(channel),
             place.group,
         )
         for name, key, (channel, place) in zip(names, keys, with_clock, strict=True)
@@ -164,7 +172,7 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in with_clock))
 
 
-def _numeric(channel: Any, skipped_channels: LeftOut) -> bool:
+def _is_numeric(channel: Any, skipped_channels: LeftOut) -> bool:
     """Whether a channel holds real numbers, one or more."""
     if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
         return True
@@ -179,7 +187,7 @@ def _channel_location(
     properties, start = channel.properties, _start_in_utc(channel)
     late = 0.0 if zero is None or start is None else (start - zero).total_seconds()
     increment = float(properties.get("wf_increment", 0.0))
-    if str(properties.get("wf_xunit_string", "s")).casefold() not in SECONDS:
+    if str(properties.get("wf_xunit_string", "s")).casefold() not in SECOND_SPELLINGS:
         skipped_channels.add("its clock does not count seconds", repr(channel.name))
         return None
     if np.isfinite(increment) and increment > 0.0:
@@ -189,9 +197,11 @@ def _channel_location(
     clocks = [
         clock
         for clock in group.channels()
-        if clock.name.casefold() in CLOCKS and len(clock) == len(channel) and _text(clock, *UNITS).casefold() in SECONDS
+        if clock.name.casefold() in TIME_CHANNEL_NAMES
+        and len(clock) == len(channel)
+        and _text(clock, *UNIT_PROPERTIES).casefold() in SECOND_SPELLINGS
     ]
-    if channel.name.casefold() in CLOCKS and clocks:
+    if channel.name.casefold() in TIME_CHANNEL_NAMES and clocks:
         return None
     if len(clocks) != 1:
         skipped_channels.add(
@@ -206,8 +216,10 @@ def _start_in_utc(channel: Any) -> datetime | None:
     stamp = channel.properties.get("wf_start_time")
     if not hasattr(stamp, "seconds"):
         return None
-    start = EPOCH + timedelta(seconds=int(stamp.seconds), microseconds=round(stamp.second_fractions * 2**-64 * 1e6))
-    return None if start - EPOCH < timedelta(days=1) else start
+    start = TDMS_EPOCH + timedelta(
+        seconds=int(stamp.seconds), microseconds=round(stamp.second_fractions * 2**-64 * 1e6)
+    )
+    return None if start - TDMS_EPOCH < timedelta(days=1) else start
 
 
 def _text(channel: Any, *names: str) -> str:
@@ -215,7 +227,7 @@ def _text(channel: Any, *names: str) -> str:
     return next((str(channel.properties[name]).strip() for name in names if name in channel.properties), "")
 
 
-def _resolution(channel: Any) -> float:
+def _value_step(channel: Any) -> float:
     """Step between values stored as whole numbers without a scaling; 0 otherwise."""
     scaled = any(name.startswith("NI_Scale") for name in channel.properties)
     return 1.0 if channel.dtype.kind in "iu" and not scaled else 0.0

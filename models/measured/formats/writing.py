@@ -23,16 +23,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.core.csv_header import heading
+from models.core.csv_header import name_and_unit
 from models.core.errors import InputError
 from models.core.whole_files import DISK_FULL_ERRORS
 from models.measured.formats.csv_layout import is_clock
-from models.measured.formats.mdf4 import unheard
-from models.measured.formats.rpc3 import BLOCK, KEY, RECORD
+from models.measured.formats.mdf4 import suppressed_output
+from models.measured.formats.rpc3 import HEADER_BLOCK, KEY_LENGTH, RECORD_LENGTH
 
-POINTS = 2048
+POINTS_PER_GROUP = 2048
 """Samples of a group of RPC III, which is also a frame."""
-LONGEST_VALUE = RECORD - KEY - 1
+LONGEST_VALUE = RECORD_LENGTH - KEY_LENGTH - 1
 """Bytes of a value of RPC III before the zero that ends it."""
 MOST_PARAMETERS = 1024
 """Parameters of a header of RPC III."""
@@ -93,7 +93,7 @@ def _only_group(path: Path, groups: Sequence[ChannelGroup], format_name: str) ->
     return groups[0]
 
 
-def missing(path: Path, format_name: str, package: str) -> InputError:
+def missing_package_error(path: Path, format_name: str, package: str) -> InputError:
     """Error for a format whose package is not installed."""
     return InputError(path, "", None, f"{format_name} files need {package}: pip install 'twinrig[measured]'")
 
@@ -133,7 +133,7 @@ def write_csv(
     for name, unit in zip(group.names, group.units, strict=True):
         if is_clock(name):
             raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
-        if heading(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
+        if name_and_unit(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
             raise InputError(path, f"channel {name!r}, unit", unit, "a unit in CSV has no brackets and no line ends")
     with temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_csv_header(group, start, comment))
@@ -165,7 +165,7 @@ def write_mdf(
     try:
         from asammdf import MDF
     except ImportError:
-        raise missing(path, "MDF", "asammdf") from None
+        raise missing_package_error(path, "MDF", "asammdf") from None
     mdf = MDF(version="4.10", temporary_folder=str(temporary.parent))
     try:
         if start is None:
@@ -175,14 +175,14 @@ def write_mdf(
         mdf.header.comment = comment
         for index, group in enumerate(groups):
             for first, values in group.rows(path):
-                _append(mdf, index, group, group.period * np.arange(first, first + len(values)), values)
-        with unheard():
+                _append_block(mdf, index, group, group.period * np.arange(first, first + len(values)), values)
+        with suppressed_output():
             mdf.save(temporary)
     finally:
         mdf.close()
 
 
-def _append(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values: np.ndarray) -> None:
+def _append_block(mdf: Any, index: int, group: ChannelGroup, times: np.ndarray, values: np.ndarray) -> None:
     """Append a block to a group; the first block creates the group."""
     from asammdf import Signal
 
@@ -204,7 +204,7 @@ def write_tdms(
     try:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:
-        raise missing(path, "TDMS", "npTDMS") from None
+        raise missing_package_error(path, "TDMS", "npTDMS") from None
     with TdmsWriter(str(temporary)) as file:
         file.write_segment([RootObject({"description": comment} if comment else {})])
         for number, group in enumerate(groups, start=1):
@@ -239,25 +239,25 @@ def write_rpc(
     limits = np.tile([[np.inf], [-np.inf]], len(group.names))
     with temporary.open("wb") as file:
         file.write(_rpc_header(path, group, limits, start, comment))
-        for values in _frames(path, group):
+        for values in _equal_frames(path, group):
             limits = np.array([np.fmin(limits[0], np.fmin.reduce(values)), np.fmax(limits[1], np.fmax.reduce(values))])
             file.write(np.ascontiguousarray(values.T).astype("<f4").tobytes())
         file.seek(0)
         file.write(_rpc_header(path, group, np.where(np.isfinite(limits), limits, 0.0), start, comment))
 
 
-def _frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
+def _equal_frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
     """Values in frames of equal length; the last frame is padded with the last values."""
     kept = np.empty((0, len(group.names)))
     for first, values in group.rows(path):
         if (np.abs(values) > np.finfo("<f4").max).any():
             raise InputError(path, f"sample {first} and after", None, "values above 3.4e38 have no room in RPC III")
         kept = np.concatenate((kept, values))
-        used = len(kept) // POINTS * POINTS
-        yield from kept[:used].reshape(-1, POINTS, len(group.names))
+        used = len(kept) // POINTS_PER_GROUP * POINTS_PER_GROUP
+        yield from kept[:used].reshape(-1, POINTS_PER_GROUP, len(group.names))
         kept = kept[used:]
     if len(kept):
-        yield np.concatenate((kept, np.repeat(kept[-1:], POINTS - len(kept), axis=0)))
+        yield np.concatenate((kept, np.repeat(kept[-1:], POINTS_PER_GROUP - len(kept), axis=0)))
 
 
 def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
@@ -270,9 +270,9 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
         "OPERATION": "twinrig",
         "CHANNELS": len(group.names),
         "DELTA_T": repr(group.period),
-        "PTS_PER_FRAME": POINTS,
-        "PTS_PER_GROUP": POINTS,
-        "FRAMES": -(-group.count // POINTS),
+        "PTS_PER_FRAME": POINTS_PER_GROUP,
+        "PTS_PER_GROUP": POINTS_PER_GROUP,
+        "FRAMES": -(-group.count // POINTS_PER_GROUP),
         "SAMPLES": group.count,
         "BYPASS_FILTER": 0,
         "HALF_FRAMES": 0,
@@ -295,12 +295,14 @@ def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: date
             "write fewer channels or comments, or MDF 4"
         )
         raise InputError(path, "channels", len(group.names), text)
-    blocks = -(-count // (BLOCK // RECORD))
+    blocks = -(-count // (HEADER_BLOCK // RECORD_LENGTH))
     parameters = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **parameters}
-    return b"".join(_record(path, key, str(value)) for key, value in parameters.items()).ljust(blocks * BLOCK, b"\0")
+    return b"".join(_header_record(path, key, str(value)) for key, value in parameters.items()).ljust(
+        blocks * HEADER_BLOCK, b"\0"
+    )
 
 
-def _record(path: Path, key: str, value: str) -> bytes:
+def _header_record(path: Path, key: str, value: str) -> bytes:
     """One header parameter as bytes."""
     try:
         text = value.encode("latin-1")
@@ -309,7 +311,7 @@ def _record(path: Path, key: str, value: str) -> bytes:
         raise InputError(path, key, value, f"RPC III has no {letter!r}: write it otherwise, or MDF 4") from None
     if len(text) > LONGEST_VALUE or "\0" in value:
         raise InputError(path, key, value, f"RPC III has room for {LONGEST_VALUE} characters, and this has {len(text)}")
-    return key.encode("ascii").ljust(KEY, b"\0") + text.ljust(RECORD - KEY, b"\0")
+    return key.encode("ascii").ljust(KEY_LENGTH, b"\0") + text.ljust(RECORD_LENGTH - KEY_LENGTH, b"\0")
 
 
 def _spread_long_text(name: str, text: str) -> dict[str, object]:
@@ -320,7 +322,7 @@ def _spread_long_text(name: str, text: str) -> dict[str, object]:
     }
 
 
-WRITERS: dict[str, Callable[[Path, Path, Sequence[ChannelGroup], datetime | None, str], None]] = {
+WRITER_OF_EXTENSION: dict[str, Callable[[Path, Path, Sequence[ChannelGroup], datetime | None, str], None]] = {
     ".csv": write_csv,
     ".mf4": write_mdf,
     ".rsp": write_rpc,

@@ -3,7 +3,7 @@
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.scene_effects import check as check_effects
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.bicycle.run import REFERENCE, assumptions
 from models.systems.bicycle.scene import BicycleScene
 
@@ -19,7 +19,7 @@ def check(scene: BicycleScene, engines: tuple[str, ...]) -> None:
     scene.whipple.eigenvalues(scene.run.speed, scene.control)
 
 
-def _upright(scene: BicycleScene) -> str:
+def _stability_text(scene: BicycleScene) -> str:
     """Text that says whether a small lean dies out or grows at the run's speed, by the linear equations."""
     speed = scene.run.speed
     growth = float(scene.whipple.eigenvalues(speed, scene.control).real.max())
@@ -44,7 +44,7 @@ def describe(scene: BicycleScene) -> str:
         "stable": f"without control from the weave speed to the capsize speed: {told}",
         "speeds": f"{speeds.count} from {speeds.start:g} to {speeds.stop:g} m/s, linear equations",
         "run": f"from {run.speed:g} m/s upright with a lean rate of {run.lean_rate:g} rad/s, {run.duration:g} s",
-        "upright": _upright(scene),
+        "upright": _stability_text(scene),
         "tyres": f"brushes of {tyres.cells} cells per strip, {tyres.stiffness:g} times as stiff as {tyres.cornering:g} "
         f"of the load per rad and {tyres.vertical:g} N/m",
         "engines": f"bodies and joints, tyres and control by one compiled kernel, Runge-Kutta 4, {run.step:g} s",

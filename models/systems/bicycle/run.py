@@ -5,11 +5,11 @@ import time
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
-from models.bicycle.four_bodies import FALLEN, LEAN, STEER, YAW, Ride, Y, straight
+from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, Ride, Y, straight_rolling
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import Series, by_steps, not_estimated, stated
+from models.core.discretisation import Series, by_steps, not_estimated, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Settings
@@ -21,12 +21,12 @@ REFERENCE = "reference"
 COORDINATES = {"x": "m", "y": "m", "yaw": "rad", "height": "m", "lean": "rad", "pitch": "rad"}
 COORDINATES |= {"rear_angle": "rad", "steer": "rad", "front_angle": "rad"}
 """Channels in the order of ``models.bicycle.four_bodies``; each with its rate, whose name ends in _rate."""
-LATERAL = [Y, YAW, LEAN, STEER]
-MOVED = 1e-7
+LATERAL_COORDINATES = [Y, YAW, LEAN, STEER]
+LINEARISATION_STEP = 1e-7
 """m, rad and per s by which states are moved to linearise: stiff bristles begin to slide at more."""
-SHOWN = ("lean", "steer", "yaw")
+CHANNELS_WITH_ERROR = ("lean", "steer", "yaw")
 """Channels whose error is told."""
-OPEN = 1e-3
+UNACCOUNTED_ENERGY_SHARE = 1e-3
 """Share of the energy that a run may leave unaccounted for: below 0.1 m/s tyres are stiff, and long steps wander."""
 ROWS_APART = 0.01
 """s between rows, at most."""
@@ -40,7 +40,7 @@ def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
     error : whether the error of the steps is estimated, by further runs in longer steps.
     """
     begun = time.process_time()
-    ride = ideal(scene) if engine == REFERENCE else ridden(scene, engine, scene.run.step)
+    ride = ride_with_ideal_rolling(scene) if engine == REFERENCE else ride_on_tyres(scene, engine, scene.run.step)
     seconds = time.process_time() - begun
     channels = dict[str, Channel]()
     for i, (name, unit) in enumerate(COORDINATES.items()):
@@ -81,7 +81,7 @@ def assumptions(scene: BicycleScene) -> list[Assumption]:
     ]
 
 
-def ridden(
+def ride_on_tyres(
     scene: BicycleScene, engine: str, step: float, duration: float | None = None, stride: int | None = None
 ) -> Ride:
     """Run the bicycle on its tyres in an engine with a step (s). The work counts all steps; recorded rows are
@@ -89,24 +89,24 @@ def ridden(
     """
     rolling, run = scene.rolling(), scene.run
     model = free_model(engine, rolling.driven, Settings("RK4", step, run.duration if duration is None else duration))
-    path = model.run(*straight(rolling.bicycle, run.speed, run.lean_rate))
-    fallen = np.abs(path.positions[:, LEAN]) > FALLEN
+    path = model.run(*straight_rolling(rolling.bicycle, run.speed, run.lean_rate))
+    fallen = np.abs(path.positions[:, LEAN]) > FALLEN_LEAN
     if fallen.any():
         raise RunFailed(engine, "the bicycle has fallen over", float(path.times[np.argmax(fallen)]))
     tyres, ledger = rolling.report(path.positions, path.rates)
     work = cumulative_simpson(ledger[:, DISSIPATED] + ledger[:, STEER_POWER], x=path.times, initial=0.0)
     steps = len(path.times) - 1
-    kept = slice(None, None, stride or _stride(steps, step))
+    kept = slice(None, None, stride or _steps_between_rows(steps, step))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept], path.rates[kept]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
     ride = Ride(path.times[kept], q, v, motion + ledger[kept, POTENTIAL], work[kept], steps, tyres[kept])
-    if not ride.unaccounted() < OPEN:
+    if not ride.unaccounted() < UNACCOUNTED_ENERGY_SHARE:
         why = f"{ride.unaccounted():.2g} of the energy is unaccounted for: shorten run.step, {step:g} s is too long"
         raise RunFailed(engine, why, float(path.times[-1]))
     return ride
 
 
-def _stride(steps: int, step: float) -> int:
+def _steps_between_rows(steps: int, step: float) -> int:
     """Largest number of steps (s) between rows that are at most ROWS_APART (s) and a twentieth of the run apart, and
     end with the run.
     """
@@ -114,7 +114,7 @@ def _stride(steps: int, step: float) -> int:
     return next(stride for stride in range(most, 0, -1) if steps % stride == 0)
 
 
-def ideal(scene: BicycleScene) -> Ride:
+def ride_with_ideal_rolling(scene: BicycleScene) -> Ride:
     """Run the bicycle with ideal rolling, which is without slip; rows of the result are ROWS_APART (s) apart."""
     rolling, run = scene.rolling(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
@@ -125,10 +125,12 @@ def ideal(scene: BicycleScene) -> Ride:
 def _with_step_error(run: Result, scene: BicycleScene) -> Result:
     """The result with the error that its finite time steps cause, estimated by runs in longer steps."""
     ride, engine, duration = run.detail, run.data.attrs["engine"], scene.run.duration
-    stride = _stride(ride.steps, scene.run.step)  # in steps of any length: rows of longer ones are among these rows
+    stride = _steps_between_rows(
+        ride.steps, scene.run.step
+    )  # in steps of any length: rows of longer ones are among these rows
 
     def series(ride: Ride) -> Series:
-        columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in SHOWN}
+        columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in CHANNELS_WITH_ERROR}
         return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
     def rerun(factor: float, share: float) -> Series:
@@ -137,25 +139,25 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
         if factor > 1.0 and steps < 2 * stride:
             raise RunFailed(engine, f"steps of {step:g} s are too long for {share * duration:g} s")
         steps = max(steps, 2 * stride)
-        return series(ridden(scene, engine, step, steps * step, stride))
+        return series(ride_on_tyres(scene, engine, step, steps * step, stride))
 
     told, how = by_steps(series(ride), rerun, 4.0, scene.run.step)
-    return stated(run, told, how)
+    return with_stated_errors(run, told, how)
 
 
 def lateral_matrix(model: FreeModel, rolling: RollingBicycle, speed: float) -> np.ndarray:
     """State matrix (8, 8) of an engine's model, linearised about straight rolling at a speed (m/s). The state holds
     lateral position, yaw, lean and steer, then their rates.
     """
-    q, v = straight(rolling.bicycle, speed)
+    q, v = straight_rolling(rolling.bicycle, speed)
     matrix = np.eye(8, 8, 4)
     for j in range(8):
         ends = []
-        for moved in (MOVED, -MOVED):
+        for moved in (LINEARISATION_STEP, -LINEARISATION_STEP):
             state = np.array([q, v])
-            state[j // 4, LATERAL[j % 4]] += moved
-            ends.append(model.acceleration(0.0, *state)[LATERAL])
-        matrix[4:, j] = np.subtract(*ends) / (2.0 * MOVED)
+            state[j // 4, LATERAL_COORDINATES[j % 4]] += moved
+            ends.append(model.acceleration(0.0, *state)[LATERAL_COORDINATES])
+        matrix[4:, j] = np.subtract(*ends) / (2.0 * LINEARISATION_STEP)
     return matrix
 
 

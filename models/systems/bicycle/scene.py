@@ -10,7 +10,7 @@ from pydantic import Field
 from models.bicycle.rolling_tyres import UNCHANGED_TYRE, BicycleTyre, RollingBicycle
 from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
 from models.core.errors import InputError
-from models.core.scene_effects import extended, with_own
+from models.core.scene_effects import extended_by_effects, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Strict, quantity
@@ -61,7 +61,7 @@ class BicycleScene(SceneFile):
 
     def rolling(self) -> RollingBicycle:
         """The bicycle on its tyres with the scene's control and effects."""
-        return extended(RollingBicycle(self.whipple, self.tyres, self.control), self)
+        return extended_by_effects(RollingBicycle(self.whipple, self.tyres, self.control), self)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BicycleScene:

@@ -11,30 +11,30 @@ import numpy as np
 
 from models.brake.controller import Pressures
 from models.brake.figures_of_merit import (
-    KMH,
+    METRES_PER_SECOND_OF_KMH,
     Axles,
     adhesion_front,
     adhesion_of_vehicle,
     adhesion_rear,
     adhesion_trailer,
     braking_rate,
-    crossing,
+    crossing_time,
     mean_of_fastest,
     split_rate,
 )
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
-from models.systems.braking.march import Braked, BrakingPath
-from models.systems.braking.of_scene import braked, sides, vehicle_of
+from models.systems.braking.march import BrakedVehicle, BrakingPath
+from models.systems.braking.of_scene import braked_vehicle, surfaces_of_stretch, vehicle_of
 from models.systems.braking.plan import controller_text
-from models.systems.braking.procedures import looped, step_steer
+from models.systems.braking.procedures import controlled_run, step_steer
 from models.systems.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.systems.braking.stop_report import Stop
 
-AXLES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
-HALVINGS = 9
+AXLE_NAMES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
+PRESSURE_HALVINGS = 9
 """Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
-LONGEST = 120.0
+LONGEST_RUN = 120.0
 """s: for which a run that measures adhesion may last, however long those of the scene are."""
 BELOW_LOCK = (1.0, 0.98, 0.96)
 """Pressures of the three runs, by the largest that does not lock."""
@@ -66,7 +66,7 @@ class Utilised:
     """
 
     z: float
-    k: Adhesion
+    adhesion: Adhesion
     k_vehicle: float
 
     @property
@@ -85,85 +85,92 @@ def axles(scene: BrakingScene) -> Axles:
     return Axles(front, weight - front, truck.wheelbase, truck.height)
 
 
-def trailer_loads(vehicle: Braked, z: float) -> np.ndarray:
+def trailer_loads(vehicle: BrakedVehicle, z: float) -> np.ndarray:
     """Loads (2,) in N of the trailer's axles at a deceleration z g; (0,) without one."""
     loads = vehicle.plane.static - vehicle.plane.by_x * z * GRAVITY
     return loads[4:].reshape(-1, 2).sum(axis=1)
 
 
-def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
+def vehicle_on_one_surface(scene: BrakingScene, surface: str, **changes: Any) -> BrakedVehicle:
     """The scene's vehicle on the same surface everywhere; ``changes`` replace values of the scene, for example its
     trailer.
     """
     road = RoadTable(stretches=[Stretch(left=surface)])
-    return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
+    return braked_vehicle(scene.model_copy(update={"road": road, **changes}), Procedure())
 
 
-def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
+def measured_adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """Adhesion k of both axles on a surface: each axle is braked alone from 50 km/h without locking. Raises
     NoAdhesion.
     """
     vehicle, lengths = vehicle_on_one_surface(scene, surface, trailer=None), axles(scene)
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         raise NoAdhesion("axles are braked without trailer: name a vehicle.file whose vehicle tows nothing")
-    front, rear = adhesion_front(_rate(scene, vehicle, 0), lengths), adhesion_rear(_rate(scene, vehicle, 1), lengths)
+    front, rear = (
+        adhesion_front(_braking_rate(scene, vehicle, 0), lengths),
+        adhesion_rear(_braking_rate(scene, vehicle, 1), lengths),
+    )
     if scene.trailer is None:
         return Adhesion(front, rear)
     train = vehicle_on_one_surface(scene, surface)
-    rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
+    rates, weight = [_braking_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
     trailer = (adhesion_trailer(z, weight, float(trailer_loads(train, z)[i])) for i, z in enumerate(rates))
     return Adhesion(front, rear, tuple(trailer))
 
 
-def _by_system(scene: BrakingScene, name: str, vehicle: Braked, speeds: tuple[float, float, float]) -> float:
+def _by_system(scene: BrakingScene, name: str, vehicle: BrakedVehicle, speeds: tuple[float, float, float]) -> float:
     """Braking rate z between the last two of three speeds (km/h), braked from the first one. The scene's controller
     brakes, or what is connected to its port, which writes no log.
     """
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
-    lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST})})
+    lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST_RUN})})
     begin, high, low = speeds
-    path = looped(lasting, name, vehicle, vehicle.rolling(begin * KMH))
-    return braking_rate(high * KMH, low * KMH, _between(path, high, low))
+    path = controlled_run(lasting, name, vehicle, vehicle.rolling(begin * METRES_PER_SECOND_OF_KMH))
+    return braking_rate(high * METRES_PER_SECOND_OF_KMH, low * METRES_PER_SECOND_OF_KMH, _slowing_time(path, high, low))
 
 
-def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
+def _braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle: int) -> float:
     """Braking rate z with one axle braked, from the mean time of the fastest runs between 40 and 20 km/h."""
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
     def run(pressure: float) -> BrakingPath:
-        return vehicle.run(Pressures(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
+        return vehicle.run(Pressures(np.where(wheels, pressure, 0.0)), 50.0 * METRES_PER_SECOND_OF_KMH, LONGEST_RUN)
 
     low, high = 0.0, scene.brakes.supply
-    if not _locks(run(high)):
-        raise NoAdhesion(f"the {AXLES[axle]} does not lock at the supply's {high:g} bar")
-    for _ in range(HALVINGS):
+    if not _wheel_locks(run(high)):
+        raise NoAdhesion(f"the {AXLE_NAMES[axle]} does not lock at the supply's {high:g} bar")
+    for _ in range(PRESSURE_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _locks(run(middle)) else (middle, high)
-    times = [_between(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
+        low, high = (low, middle) if _wheel_locks(run(middle)) else (middle, high)
+    times = [_slowing_time(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
     if not np.isfinite(times).any():
-        raise NoAdhesion(f"the {AXLES[axle]} alone does not slow the vehicle down to 20 km/h")
-    return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
+        raise NoAdhesion(f"the {AXLE_NAMES[axle]} alone does not slow the vehicle down to 20 km/h")
+    return braking_rate(
+        40.0 * METRES_PER_SECOND_OF_KMH, 20.0 * METRES_PER_SECOND_OF_KMH, mean_of_fastest(np.array(times))
+    )
 
 
-def _locks(path: BrakingPath) -> bool:
+def _wheel_locks(path: BrakingPath) -> bool:
     """Whether a wheel locks above 20 km/h."""
-    fast = Stop(path).speed[:-1] > 20.0 * KMH
+    fast = Stop(path).speed[:-1] > 20.0 * METRES_PER_SECOND_OF_KMH
     return bool((path.reports.locked[fast] > 0.0).any())
 
 
-def _between(path: BrakingPath, high: float, low: float) -> float:
+def _slowing_time(path: BrakingPath, high: float, low: float) -> float:
     """Time (s) in which the vehicle slows from one speed to another (km/h); not a number if it never reaches the
     second.
     """
     stop = Stop(path)
-    return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)
+    return crossing_time(stop.times, stop.speed, low * METRES_PER_SECOND_OF_KMH) - crossing_time(
+        stop.times, stop.speed, high * METRES_PER_SECOND_OF_KMH
+    )
 
 
 def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
     """Adhesion utilisation epsilon of the scene's anti-lock system on a surface. z is measured from 45 to 15 km/h after
     braking from 55 km/h; ``name`` is the name of the run at the port.
     """
-    lengths, k = axles(scene), k or adhesion(scene, surface)
+    lengths, k = axles(scene), k or measured_adhesion(scene, surface)
     train = vehicle_on_one_surface(scene, surface)
     z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
     loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
@@ -180,7 +187,7 @@ class Split:
     k_high: float
 
     @property
-    def asked(self) -> float:
+    def required_braking_rate(self) -> float:
         """Smallest braking rate z that the regulation requires."""
         return split_rate(self.k_low, self.k_high)
 
@@ -190,12 +197,12 @@ def split_adhesion(scene: BrakingScene, name: str) -> Split:
     the vehicle is that on each of the two surfaces of the first stretch.
     """
     procedure, alone = scene.procedures[name], scene.model_copy(update={"trailer": None})
-    both = [adhesion(alone, surface) for surface in sides(procedure, scene.road.stretches[0])]
-    z = _by_system(alone, name, braked(alone, procedure), (50.0, 40.0, 20.0))
+    both = [measured_adhesion(alone, surface) for surface in surfaces_of_stretch(procedure, scene.road.stretches[0])]
+    z = _by_system(alone, name, braked_vehicle(alone, procedure), (50.0, 40.0, 20.0))
     return Split(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in both))
 
 
-def merits(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
+def figures_of_merit(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
     """Figures of merit of a procedure, by name and unit; none where they have no meaning.
 
     Figures that need further runs are left out where a client that connects once, or a log, is behind the port, and
@@ -219,13 +226,18 @@ def merits(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
         return {}
     if procedure.kind == "split":
         both = split_adhesion(scene, name)
-        return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
+        return {
+            "z_MALS": both.z,
+            "z_MALS asked for": both.required_braking_rate,
+            "k low": both.k_low,
+            "k high": both.k_high,
+        }
     used = utilisation(scene, scene.road.stretches[0].left)
     return {
         "z_AL": used.z,
-        "k front": used.k.front,
-        "k rear": used.k.rear,
+        "k front": used.adhesion.front,
+        "k rear": used.adhesion.rear,
         "k of all": used.k_vehicle,
         "adhesion utilisation epsilon": used.epsilon,
-        **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False)),
+        **dict(zip(("k trailer front", "k trailer rear"), used.adhesion.trailer, strict=False)),
     }

@@ -13,32 +13,32 @@ import numpy as np
 from models.brake.plane_vehicle import GRAVITY, Truck
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.systems.braking.march import Braked
+from models.systems.braking.march import BrakedVehicle
 from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import HITCH, SLOWEST, Stop, wheel_names
+from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, Stop, wheel_names
 
 WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves to and fro."""
-PRESSES = 1.0
+LEAST_WHEEL_LOAD = 1.0
 """N: a wheel that bears less has left the road."""
-MOVED = 0.3
+LARGEST_LOAD_TRANSFER = 0.3
 """Of the load of a wheel at rest: by more, another axle locks first."""
-STEEREST = 0.25
+LARGEST_PARALLEL_STEER = 0.25
 """rad: inner and outer wheel of a truck are steered apart by 2 deg there, a third of the slip angle of most grip."""
-BENT = 1.0
+LARGEST_HINGE_ANGLE = 1.0
 """rad: at 57 deg the corners of truck and trailer, or the drawbar and the frame, are usually in contact."""
-HOOK, LIFTED = 0.9, 0.1
+HOOK_HEIGHT, LIFTED_LOAD_SHARE = 0.9, 0.1
 """m, height of a usual hook above the ground; share of an axle's load that its force may move."""
-LEAN = 0.12
+LARGEST_LEAN = 0.12
 """rad: at 7 deg usual springs, 1 m apart, have used 60 mm, and stand on their stops."""
-QUICK = 100.0
+FASTEST_PRESSURE_RATE = 100.0
 """bar/s: fastest filling of air chambers, 6 bar in 0.06 s."""
-HOT = 4e6
+FADING_WORK = 4e6
 """J: what 40 kg of drum or disc take up in 200 K, by which linings begin to fade."""
-DRAG, AIR, LOST = 0.6, 1.2, 0.1
+DRAG_COEFFICIENT, AIR_DENSITY, NEGLECTED_ENERGY_SHARE = 0.6, 1.2, 0.1
 """Drag coefficient of a box, density (kg/m^3), share of the kinetic energy that the air may take."""
-TIMES = 3.0
+LARGEST_LOAD_FACTOR = 3.0
 """By which factor a load may be above that of friction which is known at one load only."""
 FULL_CIRCLE = 1.5
 """rad: tables that go on to here know every slip angle."""
@@ -46,7 +46,7 @@ LEAST_SLIP_ANGLE = 1e-3
 """rad of slip angle: below, tyres have no side force to mistake."""
 
 
-def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
+def assumptions(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> list[Assumption]:
     """Assumptions of a braking procedure with a given vehicle."""
     parts = (
         _of_loads(scene),
@@ -70,7 +70,7 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "name the effect load_transfer",
             partial(_transferred_load, scene),
             "of the load at rest",
-            most=MOVED,
+            upper_limit=LARGEST_LOAD_TRANSFER,
         )
     else:
         yield Assumption(
@@ -79,7 +79,7 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "use a vehicle on its suspension, vehicle.file",
             lambda run: _of_wheels(_loads(run)),
             "N",
-            least=PRESSES,
+            lower_limit=LEAST_WHEEL_LOAD,
         )
 
 
@@ -88,7 +88,7 @@ def _loads(run: Result) -> np.ndarray:
     step is no force of a tyre.
     """
     loads = np.array(run["load"])
-    if run.detail.stands:
+    if run.detail.ended_at_rest:
         loads[-1] = np.nan
     return loads
 
@@ -103,16 +103,20 @@ def _transferred_load(scene: BrakingScene, run: Result) -> Watched:
     ahead = np.abs(rates[:, 0] * np.cos(heading) + rates[:, 1] * np.sin(heading))
     aside = np.abs(rates[:, 1] * np.cos(heading) - rates[:, 0] * np.sin(heading))
     bodies = {"truck": vehicle_of(scene), "trailer": scene.trailer}
-    return {name: _begun(_of_body(body, ahead, aside)) for name, body in bodies.items() if body is not None}
+    return {
+        name: _with_start_row(_load_transfer_of_body(body, ahead, aside))
+        for name, body in bodies.items()
+        if body is not None
+    }
 
 
-def _of_body(body: Truck, ahead: np.ndarray, aside: np.ndarray) -> np.ndarray:
+def _load_transfer_of_body(body: Truck, ahead: np.ndarray, aside: np.ndarray) -> np.ndarray:
     lever = max(1.0 / body.front.x, -1.0 / body.rear.x)  # of the axle that bears less
     track = min(body.front.track, body.rear.track)
     return body.height / GRAVITY * (ahead * lever + 2.0 * aside / track)
 
 
-def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+def _of_bodies(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Assumptions on the truck's course, its train and its springs."""
     yield Assumption(
         "forwards",
@@ -129,42 +133,42 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
                 "hitch",
                 "truck, drawbar and trailer do not touch",
                 "give trailer.fold, the angle at which they do: the run then ends there",
-                _hinges,
+                _hinge_angles,
                 "rad",
-                -BENT,
-                BENT,
+                -LARGEST_HINGE_ANGLE,
+                LARGEST_HINGE_ANGLE,
             )
         yield Assumption(
             "low hook",
             "the hook's force moves little load, though it acts at the ground",
             "balance brakes.trailer with those of the truck",
-            partial(_by_hook, scene),
+            partial(_share_lifted_by_hook, scene),
             "of an axle's load",
-            most=LIFTED,
+            upper_limit=LIFTED_LOAD_SHARE,
         )
     if vehicle.sprung is not None and vehicle.sprung.turns.size:
         yield Assumption(
             "hitch",
             "the vehicle and what it tows do not touch",
             "brake the towing vehicle less than the trailer, or steer less",
-            _hitches,
+            _hitch_angles,
             "rad",
-            -BENT,
-            BENT,
+            -LARGEST_HINGE_ANGLE,
+            LARGEST_HINGE_ANGLE,
         )
-    if vehicle.sprung is not None and _stopless(vehicle):
+    if vehicle.sprung is not None and _has_spring_without_stops(vehicle):
         yield Assumption(
             "travel",
             "springs do not reach their stops",
             "give all springs of vehicle.file a travel_force with their stops",
-            _lean,
+            _lean_angles,
             "rad",
-            -LEAN,
-            LEAN,
+            -LARGEST_LEAN,
+            LARGEST_LEAN,
         )
 
 
-def _stopless(vehicle: Braked) -> bool:
+def _has_spring_without_stops(vehicle: BrakedVehicle) -> bool:
     """Whether a vehicle on its suspension has any spring without stops: a joint element, or a spring without
     travel_force.
     """
@@ -172,17 +176,17 @@ def _stopless(vehicle: Braked) -> bool:
     return bool(whole.joint_elements) or any(spring.travel_force is None for spring in whole.springs)
 
 
-def _hinges(run: Result) -> Watched:
+def _hinge_angles(run: Result) -> Watched:
     bends = np.diff(run.detail.states[:, 0, 2:], axis=1)
     return dict(zip(("drawbar against the truck", "trailer against the drawbar"), bends.T, strict=True))
 
 
-def _hitches(run: Result) -> Watched:
-    columns = {name: i for i, name in enumerate(run.detail.coordinates) if name.endswith(HITCH)}
-    return {name.removesuffix(HITCH): run.detail.states[:, 0, i] for name, i in columns.items()}
+def _hitch_angles(run: Result) -> Watched:
+    columns = {name: i for i, name in enumerate(run.detail.coordinates) if name.endswith(HITCH_SUFFIX)}
+    return {name.removesuffix(HITCH_SUFFIX): run.detail.states[:, 0, i] for name, i in columns.items()}
 
 
-def _by_hook(scene: BrakingScene, run: Result) -> Watched:
+def _share_lifted_by_hook(scene: BrakingScene, run: Result) -> Watched:
     """Share of the load on the trailer's lighter axle that the pull at the hook moves. The pull follows from the
     balance of longitudinal forces on the truck.
     """
@@ -193,27 +197,27 @@ def _by_hook(scene: BrakingScene, run: Result) -> Watched:
     pull = run["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * along / np.maximum(np.diff(path.times), 1e-9)
     span = trailer.wheelbase
     lighter = trailer.mass * GRAVITY * min(trailer.front.x, -trailer.rear.x) / span
-    share = np.abs(pull) * HOOK / span / lighter
-    return {"hook": _begun(np.where(Stop(path).speed[1:] > SLOWEST, share, np.nan))}
+    share = np.abs(pull) * HOOK_HEIGHT / span / lighter
+    return {"hook": _with_start_row(np.where(Stop(path).speed[1:] > SLOWEST_SLIP_SPEED, share, np.nan))}
 
 
-def _lean(run: Result) -> Watched:
+def _lean_angles(run: Result) -> Watched:
     lean = Stop(run.detail).lean
     assert lean is not None
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
 
 
-def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+def _of_tyres(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Assumptions on the friction tables, and on the slip angles at which these are read."""
     tables = tables_of(scene).values()
-    largest = min(table.loads[-1] * (TIMES if table.loads.size == 1 else 1.0) for table in tables)
+    largest = min(table.loads[-1] * (LARGEST_LOAD_FACTOR if table.loads.size == 1 else 1.0) for table in tables)
     yield Assumption(
         "loads of the friction",
         "friction is known at the loads that wheels bear",
         "give tyres.files with tables up to larger loads",
         lambda run: _of_wheels(_loads(run)),
         "N",
-        most=float(largest),
+        upper_limit=float(largest),
     )
     widest = min(float(table.angles[-1]) for table in tables)
     if widest < FULL_CIRCLE:
@@ -223,20 +227,20 @@ def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
             "give tyres.files with tables up to larger slip angles",
             lambda run: _of_wheels(_while_moving(run, np.abs(run["slip_angle"]))),
             "rad",
-            most=widest,
+            upper_limit=widest,
         )
     if scene.relaxation is not None or vehicle.sprung is not None:
         yield Assumption(
             "slip at low speed",
-            f"steps resolve slip angles above {SLOWEST:g} m/s",
+            f"steps resolve slip angles above {SLOWEST_SLIP_SPEED:g} m/s",
             "raise run.substeps",
-            partial(_regular, vehicle),
+            partial(_resolved_speed, vehicle),
             "m/s of least speed",
-            most=SLOWEST,
+            upper_limit=SLOWEST_SLIP_SPEED,
         )
 
 
-def _regular(vehicle: Braked, run: Result) -> Watched:
+def _resolved_speed(vehicle: BrakedVehicle, run: Result) -> Watched:
     """Least speed (m/s) at which the steps resolve slip angles, at the samples where tyres corner below this speed; NaN
     elsewhere.
     """
@@ -246,7 +250,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
     return {"vehicle": np.where((angles > LEAST_SLIP_ANGLE) & (Stop(run.detail).speed < least), least, np.nan)}
 
 
-def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator[Assumption]:
+def _of_brakes(scene: BrakingScene, procedure: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Assumptions on brake pressures, brake torques and the valves that set the pressures."""
     port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
@@ -254,9 +258,9 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator
             "chambers",
             "chambers fill as fast as air flows",
             "name the effect pressure_dynamics, [pressure]",
-            lambda run: _of_wheels(_begun(np.diff(run["pressure"], axis=0) / scene.run.sample)),
+            lambda run: _of_wheels(_with_start_row(np.diff(run["pressure"], axis=0) / scene.run.sample)),
             "bar/s",
-            most=QUICK,
+            upper_limit=FASTEST_PRESSURE_RATE,
         )
     if port is not None:
         yield Assumption(
@@ -265,7 +269,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator
             "raise brakes.supply, or lower gain, offset and noise of port.pressures",
             lambda run: _of_wheels(run["pressure"]),
             "bar",
-            most=scene.brakes.supply * (1.0 + 1e-9),
+            upper_limit=scene.brakes.supply * (1.0 + 1e-9),
         )
     if port is not None and port.signals.range is not None:
         yield Assumption(
@@ -274,7 +278,7 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator
             "raise port.signals.range",
             lambda run: _of_wheels(np.abs(run["turning"]) * vehicle.plane.radius),
             "m/s",
-            most=port.signals.range,
+            upper_limit=port.signals.range,
         )
     measured = measured_of(scene, procedure, vehicle.plane.wheels)
     if measured is not None:
@@ -284,66 +288,66 @@ def _of_brakes(scene: BrakingScene, procedure: str, vehicle: Braked) -> Iterator
             "measure longer, or end before by run.duration",
             lambda run: {"time": run.times},
             "s",
-            most=float(measured.times[-1]) + scene.run.sample,
+            upper_limit=float(measured.times[-1]) + scene.run.sample,
         )
     yield Assumption(
         "cool brakes",
         "brakes stay so cool that their torque does not fade",
         "brake from less speed, or spread the torque: no effect knows fading",
-        _heat,
+        _brake_work,
         "J",
-        most=HOT,
+        upper_limit=FADING_WORK,
     )
 
 
-def _heat(run: Result) -> Watched:
+def _brake_work(run: Result) -> Watched:
     """Work (n, W) in J that each wheel's brake has done up to each sample."""
     power = run["torque"] * np.abs(run["turning"])
     steps = np.diff(run.times)[:, None] * 0.5 * (power[1:] + power[:-1])
     return _of_wheels(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
 
 
-def _of_drive(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+def _of_drive(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Assumptions on the driver, the drag of the air and the end of the stop."""
     yield Assumption(
         "parallel steering",
         "both front wheels are steered alike",
         "steer less: no effect has wheels that are steered apart",
-        partial(_steer, vehicle),
+        partial(_steer_angles, vehicle),
         "rad",
-        -STEEREST,
-        STEEREST,
+        -LARGEST_PARALLEL_STEER,
+        LARGEST_PARALLEL_STEER,
     )
     yield Assumption(
         "still air",
         "the air takes little of the vehicle's energy",
         "brake from less speed: no effect adds the air's drag",
-        partial(_air, scene, float(vehicle.plane.masses.sum())),
+        partial(_drag_work_share, scene, float(vehicle.plane.masses.sum())),
         "of the kinetic energy",
-        most=LOST,
+        upper_limit=NEGLECTED_ENERGY_SHARE,
     )
     yield Assumption(
         "stop",
         "the vehicle stands at the end",
         "raise run.duration",
-        lambda run: {"vehicle": np.zeros(1) if run.detail.stands else Stop(run.detail).speed[-1:]},
+        lambda run: {"vehicle": np.zeros(1) if run.detail.ended_at_rest else Stop(run.detail).speed[-1:]},
         "m/s",
-        most=0.0,
+        upper_limit=0.0,
     )
 
 
-def _steer(vehicle: Braked, run: Result) -> Watched:
+def _steer_angles(vehicle: BrakedVehicle, run: Result) -> Watched:
     if vehicle.steering is None:
         return {"front wheels": np.full(1, vehicle.steer[0])}
     return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run.times])}
 
 
-def _air(scene: BrakingScene, mass: float, run: Result) -> Watched:
+def _drag_work_share(scene: BrakingScene, mass: float, run: Result) -> Watched:
     """Work of the air's drag divided by the initial kinetic energy of the whole mass (kg). The drag is that of a box as
     wide as the track and twice as high as the centre of mass.
     """
     truck, stop = vehicle_of(scene), Stop(run.detail)
-    drag = 0.5 * AIR * DRAG * truck.front.track * 2.0 * truck.height
+    drag = 0.5 * AIR_DENSITY * DRAG_COEFFICIENT * truck.front.track * 2.0 * truck.height
     work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
     return {"vehicle": np.full(1, work / (0.5 * mass * stop.speed[0] ** 2))}
 
@@ -354,10 +358,10 @@ def _of_wheels(values: np.ndarray) -> Watched:
 
 
 def _while_moving(run: Result, values: np.ndarray) -> np.ndarray:
-    """Values (n, W) at the samples in which the vehicle is faster than SLOWEST, NaN at the others."""
-    return np.where(Stop(run.detail).speed[:, None] > SLOWEST, values, np.nan)
+    """Values (n, W) at the samples in which the vehicle is faster than SLOWEST_SLIP_SPEED, NaN at the others."""
+    return np.where(Stop(run.detail).speed[:, None] > SLOWEST_SLIP_SPEED, values, np.nan)
 
 
-def _begun(values: np.ndarray) -> np.ndarray:
+def _with_start_row(values: np.ndarray) -> np.ndarray:
     """Values (n, ...) after a row of NaN, which makes a row for every sample: the first sample has no value."""
     return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))

@@ -14,46 +14,54 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.core.discretisation import LEAST_ORDER, ROUNDING, Estimate, not_estimated, rescaled, size_of, stated
+from models.core.discretisation import (
+    LEAST_ORDER,
+    ONE_ROUNDING,
+    Estimate,
+    estimate_rescaled,
+    not_estimated,
+    size_of,
+    with_stated_errors,
+)
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
-ORDER, CAREFUL = 1.5, 1.0
+LARGEST_ORDER, CAREFUL_ORDER = 1.5, 1.0
 """Largest that is taken for the order of the steps, two between the kinks of brakes and tables of friction, and what is
 taken where two runs cannot tell."""
 WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
-LATER = 1.1
+LONGEST_REPEAT = 1.1
 """Times of the stop, until which another run may take to stand."""
-ALIKE = 0.01
+EQUAL_PRESSURE_SHARE = 0.01
 """Rms of the difference of the pressures by their deviation, up to which a controller has acted alike in two runs."""
-DISTANCE = "stopping distance"
-UNITS = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", DISTANCE: "m"}
+STOPPING_DISTANCE = "stopping distance"
+UNIT_OF_CHANNEL = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", STOPPING_DISTANCE: "m"}
 """Of what is told."""
-LEAST = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
+LEAST_SIZES = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
 """m, rad: errors of a course that moves by less are shares of this."""
 AT_ONCE = "the vehicle stands at once"
 ASKED_ONCE = "what stands behind the port answers one run alone"
-SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may act otherwise"
-REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
-LONGER = f"the controller acts otherwise in longer steps: {REMEDY}"
-SHORTER = f"the controller may act otherwise in shorter steps: {REMEDY}"
+SINGLE_STEP_NOTE = "one step to a sample leaves no longer ones, and in shorter ones the controller may act otherwise"
+SUBSTEPS_REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
+LONGER_STEPS_NOTE = f"the controller acts otherwise in longer steps: {SUBSTEPS_REMEDY}"
+SHORTER_STEPS_NOTE = f"the controller may act otherwise in shorter steps: {SUBSTEPS_REMEDY}"
 """Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
 distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 81 that did, 23 were near to
 switching otherwise; among them 11 of the 12 whose true pressures, in 25 times as many steps, were others."""
 
 
 class OtherRuns(NamedTuple):
-    """Functions that repeat a stop. rerun : the stop with a number of steps per sample, up to a time (s); raises
-    InputError or RunFailed. answered : the controller's commands to speeds of turning (n - 1, W) in rad/s and speeds of
-    the vehicle (n - 1,) in m/s at the samples of a run.
+    """Functions that repeat a stop. repeat_stop : the stop with a number of steps per sample, up to a time (s); raises
+    InputError or RunFailed. commands_for_speeds : the controller's commands to speeds of turning (n - 1, W) in rad/s
+    and speeds of the vehicle (n - 1,) in m/s at the samples of a run.
     """
 
-    rerun: Callable[[int, float], BrakingPath]
-    answered: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
+    repeat_stop: Callable[[int, float], BrakingPath]
+    commands_for_speeds: Callable[[BrakingPath, np.ndarray, np.ndarray], np.ndarray]
 
 
 Channels = dict[str, np.ndarray]
@@ -67,34 +75,34 @@ def with_error(run: Result, scene: BrakingScene, repeats: OtherRuns) -> Result:
     path, steps = run.detail, scene.run.substeps
     if len(path.times) <= 2:
         return not_estimated(run, AT_ONCE)
-    loop = controlled(scene, path)
-    if not repeatable(scene) or (loop and steps == 1):
-        return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
+    loop = pressures_are_controlled(scene, path)
+    if not can_be_repeated(scene) or (loop and steps == 1):
+        return not_estimated(run, SINGLE_STEP_NOTE if can_be_repeated(scene) else ASKED_ONCE)
     try:
-        paths = _finer_runs(path, steps, repeats.rerun)
+        paths = _finer_runs(path, steps, repeats.repeat_stop)
     except (InputError, RunFailed) as error:
         return not_estimated(run, f"other steps end the run: {error}")
     step = scene.run.sample / steps
     if steps == 1:
-        return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
+        return with_stated_errors(run, _by_twice(path, paths[0], step), "a part in half the step")
     if loop and not same_commands(path, paths[0]):
-        return not_estimated(run, LONGER)
+        return not_estimated(run, LONGER_STEPS_NOTE)
     if loop and other_command_nearby(path, paths[0], repeats):
-        return not_estimated(run, SHORTER)
+        return not_estimated(run, SHORTER_STEPS_NOTE)
     told = _by_fewer(path, steps, paths, step)
-    if rocks(scene):
-        told.pop(DISTANCE, None)
-    return stated(run, told, "runs in longer steps")
+    if rests_on_springs(scene):
+        told.pop(STOPPING_DISTANCE, None)
+    return with_stated_errors(run, told, "runs in longer steps")
 
 
-def rocks(scene: BrakingScene) -> bool:
+def rests_on_springs(scene: BrakingScene) -> bool:
     """Whether the vehicle comes to rest on springs of its tyres or axles. One step may find it at rest while another
     lets it rock on for a second: this, and some centimetres of the stopping distance, do not converge with the step.
     """
     return scene.relaxation is not None or scene.vehicle.file is not None
 
 
-def repeatable(scene: BrakingScene) -> bool:
+def can_be_repeated(scene: BrakingScene) -> bool:
     """Whether the stop can be run again. It cannot where a client connects once, a log is replayed or a clock sets the
     pace.
     """
@@ -102,7 +110,7 @@ def repeatable(scene: BrakingScene) -> bool:
     return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
 
 
-def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
+def pressures_are_controlled(scene: BrakingScene, path: BrakingPath) -> bool:
     """Whether pressures fall in a run because a controller in the loop, or something unknown at the port, released
     brakes.
     """
@@ -112,27 +120,28 @@ def controlled(scene: BrakingScene, path: BrakingPath) -> bool:
 
 def same_commands(path: BrakingPath, other_path: BrakingPath) -> bool:
     """Whether the controller acted alike in two runs: the pressures' root mean square difference is at most the share
-    ALIKE.
+    EQUAL_PRESSURE_SHARE.
     """
     pressures = _columns_at(path.times, other_path, other_path.pressures)
-    return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
+    return _rms(pressures - path.pressures) <= EQUAL_PRESSURE_SHARE * size_of(path.pressures)
 
 
 def other_command_nearby(path: BrakingPath, longer: BrakingPath, repeats: OtherRuns) -> bool:
     """Whether the controller's commands change if the signals of a run are shifted by as much as longer steps shift
-    them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than ALIKE.
+    them, in the opposite direction. Valves change if any state differs, pressures if they differ by more than
+    EQUAL_PRESSURE_SHARE.
     """
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _columns_at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
-    said, beside = (repeats.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
+    said, beside = (repeats.commands_for_speeds(path, *signals) for signals in ((turning, speed), (shifted, faster)))
     if said.dtype.kind == "i":
         return not np.array_equal(said, beside)
-    return _rms(said - beside) > ALIKE * size_of(said)
+    return _rms(said - beside) > EQUAL_PRESSURE_SHARE * size_of(said)
 
 
-def channels(path: BrakingPath, times: np.ndarray) -> Channels:
+def motion_channels(path: BrakingPath, times: np.ndarray) -> Channels:
     """Channels of the motion at times (n,) in s; after the end of the run they keep their last values."""
     places, rates = path.states[:, 0], path.states[:, 1]
     motion = {"x": places[:, 0], "y": places[:, 1], "yaw": places[:, 2], "speed": np.hypot(rates[:, 0], rates[:, 1])}
@@ -143,7 +152,7 @@ def channels(path: BrakingPath, times: np.ndarray) -> Channels:
 
 def motion_and_distance(path: BrakingPath, times: np.ndarray) -> Channels:
     """Channels of the motion, and the stopping distance (1,) if the vehicle comes to rest."""
-    return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
+    return motion_channels(path, times) | ({STOPPING_DISTANCE: Stop(path).way[-1:]} if path.ended_at_rest else {})
 
 
 def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], BrakingPath]) -> list[BrakingPath]:
@@ -153,7 +162,7 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
     last = float(path.times[-1])
     if steps == 1:
         return [rerun(2, FINE_WINDOW * last)]
-    first = rerun(steps // 2, LATER * last if path.stands else last)
+    first = rerun(steps // 2, LONGEST_REPEAT * last if path.ended_at_rest else last)
     return [first, rerun(steps // 4, WINDOW * last)] if steps >= 4 and same_commands(path, first) else [first]
 
 
@@ -167,28 +176,28 @@ def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step
         [steps, steps // 2, steps // 4],
     )
     part = path.times[path.times <= finer_runs[-1].times[-1]]
-    seen = [channels(run, part) for run in (path, *finer_runs)]
+    seen = [motion_channels(run, part) for run in (path, *finer_runs)]
     told = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
-        order = CAREFUL
-        if len(finer_runs) > 1 and name != DISTANCE:
+        order = CAREFUL_ORDER
+        if len(finer_runs) > 1 and name != STOPPING_DISTANCE:
             gaps = [_rms(first[name] - two[name]) for first, two in itertools.pairwise(seen)]
-            order = observed(gaps[0], gaps[1], counts)
+            order = observed_order_of_stop(gaps[0], gaps[1], counts)
         least = 0.0
-        if name == DISTANCE:
+        if name == STOPPING_DISTANCE:
             order, least = told["x"].order, told["x"].error
         error = _rms(fine[name] - coarse[name]) / ((counts[0] / counts[1]) ** order - 1.0)
-        told[name] = _estimate(name, fine[name], max(error, least), order, step)
+        told[name] = _estimate_of_channel(name, fine[name], max(error, least), order, step)
     return told
 
 
-def observed(fine: float, coarse: float, counts: list[int]) -> float:
-    """Observed order of convergence, at most ORDER: from the differences of neighbouring runs, fine and coarse, whose
-    steps per sample are ``counts``.
+def observed_order_of_stop(fine: float, coarse: float, counts: list[int]) -> float:
+    """Observed order of convergence, at most LARGEST_ORDER: from the differences of neighbouring runs, fine and coarse,
+    whose steps per sample are ``counts``.
     """
     if not (fine > 0.0 and coarse > 0.0):
-        return CAREFUL
-    orders = np.linspace(LEAST_ORDER, ORDER, 61)
+        return CAREFUL_ORDER
+    orders = np.linspace(LEAST_ORDER, LARGEST_ORDER, 61)
     errors = [float(count) ** -orders for count in counts]
     ratios = np.log((errors[2] - errors[1]) / (errors[1] - errors[0]))
     return float(orders[np.argmin(np.abs(ratios - math.log(coarse / fine)))])
@@ -199,11 +208,11 @@ def _by_twice(path: BrakingPath, other_path: BrakingPath, step: float) -> dict[s
     part is taken for the whole stop.
     """
     part = path.times <= other_path.times[-1]
-    fine, finer, told = channels(path, path.times), channels(other_path, path.times[part]), {}
+    fine, finer, told = motion_channels(path, path.times), motion_channels(other_path, path.times[part]), {}
     for name, values in fine.items():
-        size, seen = _size(name, values), _size(name, values[part], FINE_WINDOW)
-        error = _rms(values[part] - finer[name]) * 2.0**CAREFUL / (2.0**CAREFUL - 1.0)
-        told[name] = _estimate(name, values, error * size / seen if seen > 0.0 else 0.0, CAREFUL, step)
+        size, seen = _size_of_channel(name, values), _size_of_channel(name, values[part], FINE_WINDOW)
+        error = _rms(values[part] - finer[name]) * 2.0**CAREFUL_ORDER / (2.0**CAREFUL_ORDER - 1.0)
+        told[name] = _estimate_of_channel(name, values, error * size / seen if seen > 0.0 else 0.0, CAREFUL_ORDER, step)
     return told
 
 
@@ -212,14 +221,18 @@ def _columns_at(times: np.ndarray, path: BrakingPath, values: np.ndarray) -> np.
     return np.column_stack([np.interp(times, path.times, column) for column in values.T])
 
 
-def _size(name: str, values: np.ndarray, share: float = 1.0) -> float:
-    """Size of a channel by which its error is divided, at least LEAST; ``share`` reduces LEAST for a part of a run."""
-    return max(size_of(values), share * LEAST.get(name, 0.0))
+def _size_of_channel(name: str, values: np.ndarray, share: float = 1.0) -> float:
+    """Size of a channel by which its error is divided, at least LEAST_SIZES; ``share`` reduces LEAST_SIZES for a part
+    of a run.
+    """
+    return max(size_of(values), share * LEAST_SIZES.get(name, 0.0))
 
 
-def _estimate(name: str, values: np.ndarray, error: float, order: float, step: float) -> Estimate:
-    rounding = ROUNDING * float(np.abs(values).max(initial=0.0)) * math.sqrt(len(values))
-    return rescaled(Estimate(max(error, rounding), UNITS[name], 0.0, order, step), _size(name, values), step)
+def _estimate_of_channel(name: str, values: np.ndarray, error: float, order: float, step: float) -> Estimate:
+    rounding = ONE_ROUNDING * float(np.abs(values).max(initial=0.0)) * math.sqrt(len(values))
+    return estimate_rescaled(
+        Estimate(max(error, rounding), UNIT_OF_CHANNEL[name], 0.0, order, step), _size_of_channel(name, values), step
+    )
 
 
 def _rms(values: np.ndarray) -> float:

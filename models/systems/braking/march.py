@@ -7,20 +7,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.advance import AT_REST, ENDS, FINE, ending
+from models.brake.advance import AT_REST, FATAL_ENDS, FINE, ending_sentence
 from models.brake.brake import Brakes
 from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
 from models.brake.plane_records import PlaneMotion, Report
 from models.brake.plane_vehicle import Plane
-from models.brake.port.ask import STATES, STATES_WITH_SLOW_APPLY, ask
-from models.brake.port.sensors import Sensed
+from models.brake.port.ask import STATES_WITH_SLOW_APPLY, VALVE_STATES, ask
+from models.brake.port.sensors import SensedController
 from models.brake.pressure import Chambers, resting_chambers
 from models.brake.samples import Braking, Commands, Record, Row, by_steps, parts, row
 from models.brake.surfaces import UNIFORM_ROAD, OnRoad, Road, check_way
 from models.core.errors import RunFailed
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
 
-MOST = 1024
+MOST_SAMPLES_AT_ONCE = 1024
 """Samples of which a controller that is not asked knows nothing, at a time."""
 
 
@@ -29,9 +29,9 @@ class BrakingPath:
     """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest; coordinates : names
-    of those of the states, the first three always x, y (m) and heading (rad); clock : report of the real-time clock on
-    overruns, if the run kept to one.
+    reports : of the last step of every sample, each (n - 1, W); ended_at_rest : whether it ended at rest; coordinates :
+    names of those of the states, the first three always x, y (m) and heading (rad); clock : report of the real-time
+    clock on overruns, if the run kept to one.
     """
 
     times: np.ndarray
@@ -40,12 +40,12 @@ class BrakingPath:
     pressures: np.ndarray
     torques: np.ndarray
     reports: Report
-    stands: bool
+    ended_at_rest: bool
     coordinates: tuple[str, ...] = ()
     clock: str = ""
 
 
-class Start(NamedTuple):
+class StartState(NamedTuple):
     """State from which a run continues: positions and rates (2, 2 + U), and the wheels' speeds of turning (W,) in
     rad/s.
     """
@@ -55,7 +55,7 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Braked:
+class BrakedVehicle:
     """A vehicle on a road with brakes, ready to run.
 
     kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
@@ -88,13 +88,13 @@ class Braked:
             return tuple(self.sprung.names)
         return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
 
-    def rolling(self, speed: float) -> Start:
+    def rolling(self, speed: float) -> StartState:
         """Start state of steady rolling along x at a speed (m/s)."""
         state = np.zeros((2, len(self.coordinates)))
         state[1, 0] = speed
-        return Start(state, speed / self.plane.radius)
+        return StartState(state, speed / self.plane.radius)
 
-    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> BrakingPath:
+    def run(self, controller: Controller, start: float | StartState, duration: float = 60.0) -> BrakingPath:
         """March the vehicle from a start, or from steady rolling along x at a speed (m/s); the brake switch closes at
         ``switch``.
 
@@ -102,7 +102,7 @@ class Braked:
 
         Raises RunFailed, which names the time and whose ``partial`` is the path until then.
         """
-        given, wheels = start if isinstance(start, Start) else self.rolling(start), self.plane.wheels
+        given, wheels = start if isinstance(start, StartState) else self.rolling(start), self.plane.wheels
         check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
         now = row(given.state.shape[1], wheels)
         now.state[:], now.turning[:] = given.state, given.turning
@@ -110,17 +110,19 @@ class Braked:
             np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy()
         )
         steady = self.steering is None and is_steady(controller)
-        most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
+        most = int(min(duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
         record = Record(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
-        states = STATES_WITH_SLOW_APPLY if self.chambers.slow.size else STATES
-        beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
+        states = STATES_WITH_SLOW_APPLY if self.chambers.slow.size else VALVE_STATES
+        beyond = (
+            LARGEST_PRESSURE if isinstance(controller, SensedController) else 0.0
+        )  # noise of a sensor may exceed the supply
         motion = now.motion(np.zeros(2 + self.plane.masses.size))
         rows, status = [now.whole[None].copy()], FINE
         try:
             for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, now, motion)):
-                if status in ENDS:
-                    raise RunFailed("braking", ending(status, self.plane, motion), time)
-                _take(rows, record)
+                if status in FATAL_ENDS:
+                    raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
+                _take_rows(rows, record)
                 if status == AT_REST or time >= record.until:
                     break
                 braked = time >= self.switch - 1e-9
@@ -128,11 +130,11 @@ class Braked:
                 known = speed if self.speed_given else math.nan
                 rims = np.abs(now.turning) * self.plane.radius
                 asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
-                _tell(commands, ask(controller, asked, states, max(beyond, supply)), braked)
+                _write_command(commands, ask(controller, asked, states, max(beyond, supply)), braked)
                 if self.steering is not None:
                     commands.steer[:] = self.steering(time + 0.5 * self.sample)
         except RunFailed as error:
-            _take(rows, record)
+            _take_rows(rows, record)
             error.partial = _path(rows, now, False, self.coordinates)
             raise
         return _path(rows, now, status == AT_REST, self.coordinates)
@@ -165,18 +167,18 @@ class Braked:
 
 def on_tyres(
     plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = UNIFORM_ROAD, **more: Any
-) -> Braked:
+) -> BrakedVehicle:
     """A vehicle whose wheels point straight ahead, by default all with the same kind of tyre.
 
-    tyres : tables, surface by surface and kind by kind; more : as of ``Braked``.
+    tyres : tables, surface by surface and kind by kind; more : as of ``BrakedVehicle``.
     """
     none = np.zeros(plane.wheels)
     slope = max(tyre.cornering for tyre in tyres)
-    given = {"kind": none.astype(int), "steer": none, "tables": stacked(tyres), "slope": slope, **more}
-    return Braked(plane=plane, road=road, brakes=brakes, chambers=chambers, **given)
+    given = {"kind": none.astype(int), "steer": none, "tables": stacked_tables(tyres), "slope": slope, **more}
+    return BrakedVehicle(plane=plane, road=road, brakes=brakes, chambers=chambers, **given)
 
 
-def _tell(commands: Commands, command: Command, braked: bool) -> None:
+def _write_command(commands: Commands, command: Command, braked: bool) -> None:
     """Write a command into the arrays for the next sample."""
     if command.pressures is not None:
         commands.pressures[:] = command.pressures
@@ -185,7 +187,7 @@ def _tell(commands: Commands, command: Command, braked: bool) -> None:
         commands.pressures[0] = math.nan
 
 
-def _take(rows: list[np.ndarray], record: Record) -> None:
+def _take_rows(rows: list[np.ndarray], record: Record) -> None:
     """Append a copy of the recorded rows to ``rows``, and empty the record."""
     rows.append(record.rows[: record.left[0]].copy())
     record.left[0] = 0

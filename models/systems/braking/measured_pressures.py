@@ -13,9 +13,9 @@ from models.brake.controller import LARGEST_PRESSURE, SAMPLE, Command, Sample
 from models.core.errors import InputError
 from models.core.tables import SECONDS, read_table, write_table
 
-BARS = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
-SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
-FASTEST = 150.0
+FACTOR_TO_BAR = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
+FACTOR_TO_METRES_PER_SECOND = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+FASTEST_WHEEL_SPEED = 150.0
 """m/s; no wheel of a road vehicle turns faster."""
 
 
@@ -61,16 +61,16 @@ class MeasuredPressures:
 
 def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> MeasuredPressures:
     """Measured pressures from a CSV with units; raises InputError for a file that cannot be used."""
-    names, header = wheel_names(wheels), _header(path)
-    columns = {"time": SECONDS, **{f"pressure_{name}": BARS for name in names}}
+    names, header = wheel_names(wheels), _header_line(path)
+    columns = {"time": SECONDS, **{f"pressure_{name}": FACTOR_TO_BAR for name in names}}
     measured = "speed" in header
     if measured:
-        columns |= {f"speed_{name}": SPEEDS for name in names}
+        columns |= {f"speed_{name}": FACTOR_TO_METRES_PER_SECOND for name in names}
     table = read_table(path, columns, increasing="time", least=2)
     if table["time"][0] != 0.0:
         raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
-    pressures = _within(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
-    speeds = _within(path, table, "speed", names, FASTEST, "m/s") if measured else None
+    pressures = _columns_of_wheels(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
+    speeds = _columns_of_wheels(path, table, "speed", names, FASTEST_WHEEL_SPEED, "m/s") if measured else None
     return MeasuredPressures(table["time"], pressures, speeds, period)
 
 
@@ -84,7 +84,7 @@ def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, 
     write_table(path, columns)
 
 
-def _within(
+def _columns_of_wheels(
     path: str | Path, table: dict[str, np.ndarray], heading: str, names: tuple[str, ...], largest: float, unit: str
 ) -> np.ndarray:
     """Columns (n, W) of one quantity for all wheels; InputError for a value that is not from 0 to ``largest``."""
@@ -97,7 +97,7 @@ def _within(
     return np.column_stack([table[f"{heading}_{name}"] for name in names])
 
 
-def _header(path: str | Path) -> str:
+def _header_line(path: str | Path) -> str:
     """First line of a file that is no comment, "" if the file cannot be read: ``read_table`` then says what is
     wrong.
     """

@@ -10,28 +10,28 @@ import numpy as np
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers import CONTROLLERS
-from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, Truck, truck
+from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, Plane, Truck, plane_of_truck
 from models.brake.pressure import Chambers
 from models.brake.surfaces import Road, road
 from models.brake.surfaces import Stretch as Numbered
-from models.brake.trailer import train
+from models.brake.trailer import plane_of_train
 from models.core.errors import InputError
-from models.core.scene_effects import extended
+from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import parse
 from models.core.strict import read
-from models.systems.braking.march import Braked, on_tyres
+from models.systems.braking.march import BrakedVehicle, on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
 from models.systems.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
-from models.tyre.tyre_source import NAMES, SCALES, from_file, named
+from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, from_file, named_tyre
 from models.tyre.tyre_table import TyreTable
 
 SPRUNG_ENGINE = "mujoco"
 """Marches a vehicle on its suspension where no engine is asked for."""
 
 
-def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
+def braked_vehicle(scene: BrakingScene, procedure: Procedure) -> BrakedVehicle:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for parts that are inconsistent."""
-    plane, known = plane_of(scene), (*NAMES, *scene.tyres.files)
+    plane, known = plane_of(scene), (*SURFACE_NAMES, *scene.tyres.files)
     for name, scale in scene.tyres.scale.items():
         if name not in known:
             raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
@@ -58,10 +58,10 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     )
     if lags is not None:
         _check_lags(scene, vehicle, min(lags.front, lags.rear))
-    return extended(vehicle, scene)
+    return extended_by_effects(vehicle, scene)
 
 
-def _check_lags(scene: BrakingScene, vehicle: Braked, shortest: float) -> None:
+def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) -> None:
     """Refuse steps so long that the vehicle at rest would start to rock on its tyres, whose slip angles lag over the
     relaxation length ``shortest`` (m) or more.
     """
@@ -83,7 +83,11 @@ def plane_of(scene: BrakingScene) -> Plane:
         return plane
     vehicle = vehicle_of(scene)
     try:
-        return truck(vehicle, transfer) if scene.trailer is None else train(vehicle, scene.trailer, transfer)
+        return (
+            plane_of_truck(vehicle, transfer)
+            if scene.trailer is None
+            else plane_of_train(vehicle, scene.trailer, transfer)
+        )
     except InputError as error:
         raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
@@ -98,9 +102,11 @@ def spatial_vehicle_of(scene: BrakingScene) -> Any:
 
 def sprung_of(scene: BrakingScene) -> Any:
     """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; raises InputError."""
-    from models.brake.sprung import sprung
+    from models.brake.sprung import suspended_vehicle
 
-    return sprung(spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces)
+    return suspended_vehicle(
+        spatial_vehicle_of(scene), float(scene.vehicle.spin_inertia or 0.0), forces=scene.run.forces
+    )
 
 
 def on_springs(engine: str, vehicle: Any) -> Any:
@@ -127,42 +133,46 @@ def vehicle_of(scene: BrakingScene) -> Truck:
         table, file = parse(path), path.name
         vehicle = read(Truck, table, file)
     elif name == "paper":
-        vehicle = PAPER
+        vehicle = PAPER_TRUCK
     else:
         raise InputError(file, "vehicle.parameters", name, "no such set; a file of your own ends in .toml", ("paper",))
     if scene.vehicle.override:
-        changed = merged(vehicle.model_dump(), scene.vehicle.override)
+        changed = merged_tables(vehicle.model_dump(), scene.vehicle.override)
         vehicle = read(Truck, changed, scene.file, "vehicle.override")
     if scene.load_transfer is not None and "front" in scene.load_transfer.model_fields_set:
         share = scene.load_transfer.front
         parts = {"front": {"roll_share": share}, "rear": {"roll_share": 1.0 - share}}
-        vehicle = Truck(**merged(vehicle.model_dump(), parts))
+        vehicle = Truck(**merged_tables(vehicle.model_dump(), parts))
     return vehicle
 
 
-def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def merged_tables(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Nested tables with some of their values changed; a table that gives another ``kind`` replaces the old one."""
     new = dict(table)
     for key, value in changes.items():
         old = table.get(key)
         both = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
-        new[key] = merged(old, value) if both else value  # type: ignore[arg-type]
+        new[key] = merged_tables(old, value) if both else value  # type: ignore[arg-type]
     return new
 
 
-def sides(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
+def surfaces_of_stretch(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
     """Names of the surfaces left and right of the line on a stretch; the procedure may name the right one."""
     return stretch.left, procedure.right or stretch.right or stretch.left
 
 
 def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
     """Names of all surfaces under a procedure, each once."""
-    return list(dict.fromkeys(name for stretch in scene.road.stretches for name in sides(procedure, stretch)))
+    return list(
+        dict.fromkeys(name for stretch in scene.road.stretches for name in surfaces_of_stretch(procedure, stretch))
+    )
 
 
 def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
     """Road of a procedure; its surfaces are numbered by their index in ``names``."""
-    stretches = [Numbered(s.x, *(names.index(name) for name in sides(procedure, s))) for s in scene.road.stretches]
+    stretches = [
+        Numbered(s.x, *(names.index(name) for name in surfaces_of_stretch(procedure, s))) for s in scene.road.stretches
+    ]
     try:
         return road(stretches, scene.road.line, len(kinds_of(scene)))
     except InputError as error:
@@ -177,14 +187,14 @@ def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
 def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     """Tyre table of a surface, from the scene's file if it has one; the scene may scale its friction."""
     scale = scene.tyres.scale.get(name, 1.0)
-    if not SCALES[0] < scale <= SCALES[1]:
+    if not SCALE_BOUNDS[0] < scale <= SCALE_BOUNDS[1]:
         raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
     if name in scene.tyres.files:
         table = from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
-    elif name in NAMES:
-        table = named(name, rear)
+    elif name in SURFACE_NAMES:
+        table = named_tyre(name, rear)
     else:
-        raise InputError(scene.file, "road.stretches", name, "no such surface", (*NAMES, *scene.tyres.files))
+        raise InputError(scene.file, "road.stretches", name, "no such surface", (*SURFACE_NAMES, *scene.tyres.files))
     return table if scale == 1.0 else table.scaled(scale)
 
 

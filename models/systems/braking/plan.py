@@ -3,19 +3,19 @@
 from collections.abc import Iterator
 
 from models.brake.plane_vehicle import Truck
-from models.brake.port.setup import BEHIND, check_port
+from models.brake.port.setup import PORT_KEYS, check_port
 from models.core.assumptions import Assumption, assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.braking.assumptions import assumptions
-from models.systems.braking.of_scene import braked, controller_of, sprung_of, surfaces_of, vehicle_of
-from models.systems.braking.procedures import engines_of, port_of, ready
+from models.systems.braking.of_scene import braked_vehicle, controller_of, sprung_of, surfaces_of, vehicle_of
+from models.systems.braking.procedures import engines_of, port_of, vehicle_and_start
 from models.systems.braking.scene import BrakingScene
-from models.tyre.tyre_source import NAMES
+from models.tyre.tyre_source import SURFACE_NAMES
 from models.vehicles.plausible import GYRATION, HEIGHT, MASS, TRACK, WHEELBASE, plausible
 
-PROCEDURES = {
+PROCEDURE_TEXTS = {
     "straight": "straight braking",
     "split": "straight braking on split friction, wheels straight ahead",
     "turn": "braking in a turn, steering fixed as on the steady circle before",
@@ -27,16 +27,16 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
     _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
-        ready(scene, name)
+        vehicle_and_start(scene, name)
 
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Check tyres, brakes, road, controller and port without marching the vehicle; raises InputError."""
     for name, procedure in scene.procedures.items():
-        known = (*NAMES, *scene.tyres.files)
+        known = (*SURFACE_NAMES, *scene.tyres.files)
         if procedure.right is not None and procedure.right not in known:
             raise InputError(scene.file, f"procedures.{name}.right", procedure.right, "no such surface", known)
-        vehicle = braked(scene, procedure)
+        vehicle = braked_vehicle(scene, procedure)
         controller_of(scene, vehicle.plane.wheels, name)
         if scene.port is not None:
             for engine in engines:
@@ -70,15 +70,17 @@ def findings(scene: BrakingScene) -> tuple[Finding, ...]:
     """Doubts about implausible parameters of the vehicle, without those that the scene accepts."""
     if scene.vehicle.file is not None:
         return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
-    return tuple(query for query in _queries(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
+    return tuple(
+        query for query in _implausible_parameters(vehicle_of(scene)) if query.check not in scene.vehicle.accept
+    )
 
 
-REMEDIES = {"mass": "Masses are in kg", "size": "Lengths are in m", "inertia": "Inertias are in kg m^2"}
-RADIUS = 0.1, 1.5
+REMEDY_OF_QUERY = {"mass": "Masses are in kg", "size": "Lengths are in m", "inertia": "Inertias are in kg m^2"}
+USUAL_RADIUS_RANGE = 0.1, 1.5
 """m, of a usual wheel."""
 
 
-def _queries(truck: Truck) -> Iterator[Finding]:
+def _implausible_parameters(truck: Truck) -> Iterator[Finding]:
     """Doubts about implausible parameters of a vehicle that brakes in the plane."""
     gyration, span = (truck.yaw_inertia / truck.mass) ** 0.5, tuple(g * truck.wheelbase for g in GYRATION["rz"])
     looks = [
@@ -88,12 +90,15 @@ def _queries(truck: Truck) -> Iterator[Finding]:
         ("inertia", "radius of gyration by yaw_inertia", gyration, span),
     ]
     for name, axle in (("front", truck.front), ("rear", truck.rear)):
-        looks += [("size", f"{name}.track", axle.track, TRACK), ("size", f"{name}.radius", axle.radius, RADIUS)]
+        looks += [
+            ("size", f"{name}.track", axle.track, TRACK),
+            ("size", f"{name}.radius", axle.radius, USUAL_RADIUS_RANGE),
+        ]
     for check, place, value, usual in looks:
         if not usual[0] <= value <= usual[1]:
             unit = "kg" if check == "mass" else "m"
             bounds = f"{usual[0]:.3g} to {usual[1]:.3g} {unit}"
-            text = f"{place}: {value:.4g} {unit}; usual are {bounds}. {REMEDIES[check]}."
+            text = f"{place}: {value:.4g} {unit}; usual are {bounds}. {REMEDY_OF_QUERY[check]}."
             yield Finding(check, "doubt", place, text, value, unit)
 
 
@@ -116,12 +121,14 @@ def describe(scene: BrakingScene) -> str:
     lines = [_line(*part) for part in told.items()]
     for name, procedure in scene.procedures.items():
         names = ", ".join(surfaces_of(scene, procedure))
-        lines.append(_line(name, f"{PROCEDURES[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
+        lines.append(_line(name, f"{PROCEDURE_TEXTS[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
     if file is not None:
-        lines += [_line(*line) for line in (*_towed(scene), *_native_and_other_forces(scene))]
-    assumed = {assumption.says: assumption for name in scene.procedures for assumption in _assumed(scene, name)}
+        lines += [_line(*line) for line in (*_towed_body_lines(scene), *_native_and_other_forces(scene))]
+    assumed = {
+        assumption.says: assumption for name in scene.procedures for assumption in _assumptions_of_scene(scene, name)
+    }
     return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
 
 
@@ -144,7 +151,7 @@ def _native_and_other_forces(scene: BrakingScene) -> list[tuple[str, str]]:
     ]
 
 
-def _towed(scene: BrakingScene) -> list[tuple[str, str]]:
+def _towed_body_lines(scene: BrakingScene) -> list[tuple[str, str]]:
     """Lines on the bodies that a suspended vehicle tows; hitch positions are measured forward from its centre of
     mass.
     """
@@ -154,8 +161,8 @@ def _towed(scene: BrakingScene) -> list[tuple[str, str]]:
     return [("trailer", hitch_line(handling.vehicle, handling.held, name)) for name in handling.vehicle.towed]
 
 
-def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:
-    return assumptions(scene, name, braked(scene, scene.procedures[name]))
+def _assumptions_of_scene(scene: BrakingScene, name: str) -> list[Assumption]:
+    return assumptions(scene, name, braked_vehicle(scene, scene.procedures[name]))
 
 
 def user_code(scene: BrakingScene) -> str:
@@ -168,7 +175,7 @@ def controller_text(scene: BrakingScene) -> str:
     """Text that names the controller at the port, or the source of the measured pressures."""
     if scene.measured is not None:
         return f"measured pressures {scene.measured.file}"
-    named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]
+    named = [] if scene.port is None else [key for key in PORT_KEYS if getattr(scene.port, key) is not None]
     return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
 
 

@@ -11,32 +11,32 @@ from models.brake.controller import Pressures, Sample
 from models.brake.plane_records import motion_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
-from models.brake.port.setup import ControllerRun, opened
-from models.brake.steering import Steering, YawResponse, response
+from models.brake.port.setup import ControllerRun, controller_of_run
+from models.brake.steering import Steering, YawResponse, yaw_response
 from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError
-from models.systems.braking.march import Braked, BrakingPath, Start
-from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
+from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
+from models.systems.braking.of_scene import SPRUNG_ENGINE, braked_vehicle, controller_of
 from models.systems.braking.scene import BrakingScene, Procedure
 
-UNBRAKED = 4.0
+UNBRAKED_DURATION = 4.0
 """s: for which the response to steering is watched after its last knot."""
-STEERED = 2
+STEERED_WHEELS = 2
 """Wheels that are steered: those of the first axle, in parallel."""
-BLINK = 1e-5
+ACCELERATION_INTERVAL = 1e-5
 """s: time over which the accelerations of a steady turn are taken."""
-SPEEDS = np.linspace(0.1, 1.0, 10)
+CONTINUATION_SHARES = np.linspace(0.1, 1.0, 10)
 """Shares of the speed through which a steady turn is followed: other solutions slide beyond the tyres' peak."""
-LARGEST = 0.5
+LARGEST_TURN_ANGLE = 0.5
 """rad: steer angle, side slip and angles of hinges of a turn that is one."""
-STEADY = 1e-6
+STEADY_ACCELERATION = 1e-6
 """m/s^2, and rad/s^2 times 1 m: what is left of a steady turn's accelerations."""
 
 
-def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
+def vehicle_and_start(scene: BrakingScene, name: str) -> tuple[BrakedVehicle, StartState]:
     """Vehicle and start of a procedure; InputError for a circle that the tyres' side forces cannot hold."""
     procedure = scene.procedures[name]
-    vehicle = braked(scene, procedure)
+    vehicle = braked_vehicle(scene, procedure)
     try:
         check_way(vehicle.road, scene.run.sample / scene.run.substeps * procedure.speed)
     except InputError as error:
@@ -51,19 +51,19 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
     return replace(vehicle, steer=steering(0.0), steering=steering if procedure.steering else None), start
 
 
-def steering_of(procedure: Procedure, vehicle: Braked) -> Steering:
+def steering_of(procedure: Procedure, vehicle: BrakedVehicle) -> Steering:
     """The driver's steering from time 0 on; a single angle is applied at once."""
     knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     times, angles = np.array(knots, float).T
-    return Steering(times, angles, steered(vehicle, 1.0))
+    return Steering(times, angles, steer_angles(vehicle, 1.0))
 
 
 def step_steer(scene: BrakingScene, name: str) -> YawResponse | None:
     """Response of the yaw rate to the steering step of a J-turn without brakes; None where it does not settle."""
-    vehicle, start = ready(scene, name)
+    vehicle, start = vehicle_and_start(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
-    path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED)
-    return response(path.times, path.states[:, 1, 2], steering.half)
+    path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED_DURATION)
+    return yaw_response(path.times, path.states[:, 1, 2], steering.half)
 
 
 def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
@@ -80,20 +80,22 @@ def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ..
     )
 
 
-def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> BrakingPath:
+def controlled_run(
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str = ""
+) -> BrakingPath:
     """One run from a start, with the scene's controller in the loop or with what is connected to the port. ``engine``
     is only a name, for files.
     """
     usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
         return vehicle.run(usual, start, scene.run.duration)
-    with opened(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
+    with controller_of_run(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
         path = vehicle.run(controller, start, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
 
-def answers(
-    scene: BrakingScene, name: str, vehicle: Braked, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
+def controller_answers(
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
 ) -> np.ndarray:
     """Commands (n, W), of valves or pressures, with which a run's controller answers given speeds (m/s) of rims (n, W)
     and of the vehicle (n,) at times (n,) in s. No vehicle is simulated.
@@ -101,7 +103,9 @@ def answers(
     usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
     with ExitStack() as stack:
         if scene.port is not None:
-            usual, _ = stack.enter_context(opened(scene.port, port_of(scene, name, vehicle, "reference"), usual))
+            usual, _ = stack.enter_context(
+                controller_of_run(scene.port, port_of(scene, name, vehicle, "reference"), usual)
+            )
         known = speeds if vehicle.speed_given else np.full(speeds.shape, np.nan)
         commands = [
             usual.sample(Sample(k, round(time * 1e9), rims[k], True, supply, float(known[k])))
@@ -110,7 +114,7 @@ def answers(
     return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
-def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> ControllerRun:
+def port_of(scene: BrakingScene, name: str, vehicle: BrakedVehicle, engine: str) -> ControllerRun:
     """Facts of a run that the port needs. A log belongs to a vehicle and its drive, whatever controller answered."""
     known = {key: value for key, value in scene.table().items() if key not in ("port", "controller")}
     text = json.dumps([name, known], sort_keys=True)
@@ -126,9 +130,9 @@ def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Con
     )
 
 
-def steered(vehicle: Braked, angle: float) -> np.ndarray:
+def steer_angles(vehicle: BrakedVehicle, angle: float) -> np.ndarray:
     """Steer angles (W,) with the front wheels at one angle (rad)."""
-    return np.where(np.arange(vehicle.plane.wheels) < STEERED, angle, 0.0)
+    return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEELS, angle, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +140,7 @@ class SteadyTurn:
     """A steady circle: steer angles (W,) in rad, and a start state in which the first unit heads along x."""
 
     steer: np.ndarray
-    start: Start
+    start: StartState
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +153,7 @@ class Circle:
     first unit's place and heading: headings of the units behind, or, if it is ``sprung``, those on the springs.
     """
 
-    vehicle: Braked
+    vehicle: BrakedVehicle
     speed: float
     radius: float
     sprung: bool = False
@@ -163,7 +167,7 @@ class Circle:
 
     def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
-        vehicle, state, steer = self.vehicle, self.state(unknown), steered(self.vehicle, unknown[0])
+        vehicle, state, steer = self.vehicle, self.state(unknown), steer_angles(self.vehicle, unknown[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
         motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(state, steer, vehicle.on_road)
@@ -177,19 +181,21 @@ class Circle:
         across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
-    def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
+    def solve_steady_circle(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
         """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
         from scipy.optimize import root
 
         unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
-        return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
+        return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY_ACCELERATION)
 
     def turn(self, unknown: np.ndarray) -> SteadyTurn:
         """The steady turn, with which a procedure begins, for these unknowns."""
-        return SteadyTurn(steered(self.vehicle, unknown[0]), Start(self.state(unknown), self.motion(unknown)[1]))
+        return SteadyTurn(
+            steer_angles(self.vehicle, unknown[0]), StartState(self.state(unknown), self.motion(unknown)[1])
+        )
 
 
-def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
+def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTurn | None:
     """The steady circle (see ``Circle``) of a vehicle; None if there is none.
 
     That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
@@ -199,9 +205,9 @@ def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | No
     unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
     unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
     unknown[2:] = (last[1:] - last[0]) / radius
-    for slower in speed * SPEEDS:
-        unknown, steady = Circle(vehicle, slower, radius).settled(unknown)
-        if not steady or np.abs(unknown).max() > LARGEST:
+    for slower in speed * CONTINUATION_SHARES:
+        unknown, steady = Circle(vehicle, slower, radius).solve_steady_circle(unknown)
+        if not steady or np.abs(unknown).max() > LARGEST_TURN_ANGLE:
             return None
     circle, state = Circle(vehicle, speed, radius), Circle(vehicle, speed, radius).state(unknown)
     if vehicle.sprung is not None:
@@ -209,11 +215,11 @@ def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | No
         guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
         guess[vehicle.sprung.turns - 1] = np.diff(state[0, 2:])
         circle = Circle(vehicle, speed, radius, sprung=True)
-        unknown, steady = circle.settled(guess)
+        unknown, steady = circle.solve_steady_circle(guess)
     return circle.turn(unknown) if steady else None
 
 
-def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
+def _rolling_speeds(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
     """Speeds of turning (W,) in rad/s of wheels that roll without slip."""
     headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
     ahead = np.column_stack((np.cos(headings), np.sin(headings)))
@@ -225,13 +231,25 @@ def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
     return ((centres[unit] + spun) * along).sum(axis=1) / plane.radius
 
 
-def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _accelerations(vehicle: BrakedVehicle, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (2 + U,) of a plane vehicle whose unbraked wheels roll freely, and the wheels' speeds of turning
     (W,).
     """
-    plane, none, turning = vehicle.plane, np.zeros((2, vehicle.plane.wheels)), _rolling(vehicle.plane, state, steer)
+    plane, none, turning = (
+        vehicle.plane,
+        np.zeros((2, vehicle.plane.wheels)),
+        _rolling_speeds(vehicle.plane, state, steer),
+    )
     motion, ground = motion_of(state.copy(), turning.copy()), surfaces(plane.wheels)
     motion.accelerations[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
     under_wheels(state, 0.0, vehicle.on_road, ground)
-    step_on(motion, none, BLINK, steer, vehicle.slope * 9.81 * BLINK, vehicle.on_road, ground)
+    step_on(
+        motion,
+        none,
+        ACCELERATION_INTERVAL,
+        steer,
+        vehicle.slope * 9.81 * ACCELERATION_INTERVAL,
+        vehicle.on_road,
+        ground,
+    )
     return motion.accelerations, turning

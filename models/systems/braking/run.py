@@ -10,13 +10,13 @@ from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.systems.braking.assumptions import assumptions
 from models.systems.braking.errors import OtherRuns, with_error
-from models.systems.braking.march import Braked, BrakingPath, Start
+from models.systems.braking.march import BrakedVehicle, BrakingPath, StartState
 from models.systems.braking.of_scene import on_springs
-from models.systems.braking.procedures import answers, engines_of, looped, ready
+from models.systems.braking.procedures import controlled_run, controller_answers, engines_of, vehicle_and_start
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import wheel_names
 
-REPORTS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle": "rad"}
+REPORT_CHANNELS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle": "rad"}
 """Channels of what wheels report of the last step of every sample, with their units."""
 
 
@@ -30,22 +30,22 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     """
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
-    vehicle, start = ready(scene, name)
+    vehicle, start = vehicle_and_start(scene, name)
     vehicle = marched_by(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
-        path = looped(scene, name, vehicle, start, engine)
+        path = controlled_run(scene, name, vehicle, start, engine)
     except RunFailed as failure:
         if failure.partial is not None:
             seconds = time.perf_counter() - begun
-            failure.partial = with_assumptions(_labelled(scene, name, engine, failure.partial, seconds), assumed)
+            failure.partial = with_assumptions(_labelled_result(scene, name, engine, failure.partial, seconds), assumed)
         raise
-    stop = with_assumptions(_labelled(scene, name, engine, path, time.perf_counter() - begun), assumed)
+    stop = with_assumptions(_labelled_result(scene, name, engine, path, time.perf_counter() - begun), assumed)
 
     return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
 
 
-def marched_by(vehicle: Braked, engine: str) -> Braked:
+def marched_by(vehicle: BrakedVehicle, engine: str) -> BrakedVehicle:
     """The vehicle with the engine that marches it. In the plane, "reference" means the vehicle's own steps."""
     if vehicle.sprung is not None:
         return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
@@ -56,22 +56,22 @@ def marched_by(vehicle: Braked, engine: str) -> Braked:
     return replace(vehicle, engine=CarriedChassis(engine, vehicle.plane))
 
 
-def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str) -> OtherRuns:
+def _other_runs(scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str) -> OtherRuns:
     """Functions that repeat the procedure in other steps and write no log."""
     if scene.port is not None:
         scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
 
     def rerun(steps: int, until: float) -> BrakingPath:
         shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": until})})
-        return looped(shorter, name, replace(vehicle, substeps=steps), start, engine)
+        return controlled_run(shorter, name, replace(vehicle, substeps=steps), start, engine)
 
     def answered(path: BrakingPath, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-        return answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
+        return controller_answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
 
     return OtherRuns(rerun, answered)
 
 
-def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
+def _labelled_result(scene: BrakingScene, name: str, engine: str, path: BrakingPath, seconds: float) -> Result:
     """Result with the motion of each coordinate and with the turning, pressure, torque, forces, load and slips of each
     wheel.
     """
@@ -88,7 +88,7 @@ def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, se
     begun = np.full((1, path.turning.shape[1]), np.nan)
     channels |= {
         name: Channel(wheel, np.concatenate((begun, getattr(path.reports, name))), unit)
-        for name, unit in REPORTS.items()
+        for name, unit in REPORT_CHANNELS.items()
     }
     samples = len(path.times) - 1
     return result(
@@ -104,5 +104,5 @@ def _labelled(scene: BrakingScene, name: str, engine: str, path: BrakingPath, se
         seconds=seconds,
         detail=path,
         title=f"{scene.title}: {name}",
-        stands=int(path.stands),
+        stands=int(path.ended_at_rest),
     )

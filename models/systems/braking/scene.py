@@ -15,8 +15,8 @@ from models.brake.trailer import Trailer
 from models.core.errors import InputError
 from models.core.scene_effects import check, read_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.strict import Query, Strict, accepted, quantity
-from models.own_model.scene_vehicle import MJCF
+from models.core.strict import Query, Strict, accepted_queries_field, quantity
+from models.own_model.scene_vehicle import MJCF_EXTENSION
 
 LARGEST_SPEED = 100.0
 """m/s; no road vehicle brakes from more."""
@@ -41,7 +41,7 @@ class VehicleTable(Strict):
         "with twinrig, as r19_free, a TOML file of your own or a car in MJCF",
     )
     spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which a TOML file lacks", default=None)
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class LoadTransfer(Strict):
@@ -184,30 +184,30 @@ class BrakingScene(SceneFile):
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(BrakingScene, table, file, folder)
-    parts = (_of_procedures, _of_vehicle, _of_brakes, _of_run)
+    parts = (_of_procedures, _of_vehicle, _of_brakes, _refusals_of_run)
     for place, value, allowed in chain.from_iterable(part(scene) for part in parts):
         raise InputError(scene.file, place, value, allowed)
     check(scene)
     return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
 
 
-READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
+KEYS_OF_PROCEDURE = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
 """Keys that a procedure reads beside its speed; it needs one of them."""
-STEEPEST = 1.0
+STEEPEST_STEER = 1.0
 """rad; no wheel is steered further."""
-Refusals = Iterator[tuple[str, Any, str]]
+RefusedPlaces = Iterator[tuple[str, Any, str]]
 """Places that cannot be so, their values, and what is allowed."""
 
 
-def _of_procedures(scene: BrakingScene) -> Refusals:
+def _of_procedures(scene: BrakingScene) -> RefusedPlaces:
     for name, procedure in scene.procedures.items():
         yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _of_procedure(procedure))
 
 
-def _of_procedure(procedure: Procedure) -> Refusals:
+def _of_procedure(procedure: Procedure) -> RefusedPlaces:
     if procedure.speed > LARGEST_SPEED:
         yield "speed", procedure.speed, f"must be at most {LARGEST_SPEED:g} m/s"
-    read = READ[procedure.kind]
+    read = KEYS_OF_PROCEDURE[procedure.kind]
     named = [key for key in ("right", "steer", "steering", "radius") if getattr(procedure, key) is not None]
     for key in named:
         if key not in read:
@@ -216,19 +216,19 @@ def _of_procedure(procedure: Procedure) -> Refusals:
         yield read[0], None, f"is missing: {procedure.kind} needs {' or '.join(read)}"
     if len(named) > 1:
         yield named[1], None, f"has no meaning beside {named[0]}: leave one out"
-    if procedure.steer is not None and abs(procedure.steer) > STEEPEST:
-        yield "steer", procedure.steer, f"must be at most {STEEPEST:g} rad, of either sign"
+    if procedure.steer is not None and abs(procedure.steer) > STEEPEST_STEER:
+        yield "steer", procedure.steer, f"must be at most {STEEPEST_STEER:g} rad, of either sign"
     if procedure.steering is not None:
         times, angles = np.array(procedure.steering, float).T
         if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
             yield "steering", times.tolist(), "times must rise from knot to knot, from 0 on, in s"
-        if np.abs(angles).max() > STEEPEST:
-            yield "steering", angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign"
+        if np.abs(angles).max() > STEEPEST_STEER:
+            yield "steering", angles.tolist(), f"angles must be at most {STEEPEST_STEER:g} rad, of either sign"
     if procedure.radius is not None and abs(procedure.radius) < 10.0:
         yield "radius", procedure.radius, "must be at least 10 m, of either sign"
 
 
-def _of_vehicle(scene: BrakingScene) -> Refusals:
+def _of_vehicle(scene: BrakingScene) -> RefusedPlaces:
     """Refusals of keys that repeat what vehicle.file defines, and of keys that have no meaning without this file."""
     vehicle = scene.vehicle
     if vehicle.file is None:
@@ -237,14 +237,14 @@ def _of_vehicle(scene: BrakingScene) -> Refusals:
         if scene.run.forces == "compiled":
             yield "run.forces", scene.run.forces, "has no meaning without vehicle.file: nothing has springs"
         return
-    if vehicle.spin_inertia is None and not str(vehicle.file).endswith(MJCF):
+    if vehicle.spin_inertia is None and not str(vehicle.file).endswith(MJCF_EXTENSION):
         yield "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it"
     for key, named in (("parameters", "parameters" in vehicle.model_fields_set), ("override", vehicle.override)):
         if named:
             yield f"vehicle.{key}", None, "has no meaning beside vehicle.file, which says it all"
 
 
-def _of_brakes(scene: BrakingScene) -> Refusals:
+def _of_brakes(scene: BrakingScene) -> RefusedPlaces:
     """Refusals of a supply pressure that no vehicle has, and of torques that no brake gives."""
     supply = scene.brakes.supply
     if supply > LARGEST_PRESSURE:
@@ -256,7 +256,7 @@ def _of_brakes(scene: BrakingScene) -> Refusals:
             yield f"brakes.{axle}.{key}", value, most
 
 
-def _of_run(scene: BrakingScene) -> Refusals:
+def _refusals_of_run(scene: BrakingScene) -> RefusedPlaces:
     run, pressure = scene.run, scene.pressure
     if not 1e-4 <= run.sample <= 0.1:
         yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"

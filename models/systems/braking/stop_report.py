@@ -11,24 +11,24 @@ import numpy as np
 from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
 from models.systems.braking.march import BrakingPath
 
-WHEELS = "front left", "front right", "rear left", "rear right"
+WHEEL_NAMES = "front left", "front right", "rear left", "rear right"
 TOWED_WHEELS = {
     0: (),
     2: ("trailer left", "trailer right"),
     4: ("trailer front left", "trailer front right", "trailer rear left", "trailer rear right"),
 }
 """Names of the wheels of what is towed, by their number."""
-HITCH = " hitch rz"
+HITCH_SUFFIX = " hitch rz"
 """End of the names of coordinates by which a towed body yaws beside what tows it."""
-SLOWEST = 1.0
+SLOWEST_SLIP_SPEED = 1.0
 """m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
-LIMITS = (0.2, 0.5)
+SLIP_LIMITS = (0.2, 0.5)
 """Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
 
 
 def wheel_names(count: int) -> tuple[str, ...]:
     """Names of a vehicle's ``count`` wheels, those of towed vehicles included."""
-    return (*WHEELS, *TOWED_WHEELS[count - len(WHEELS)])
+    return (*WHEEL_NAMES, *TOWED_WHEELS[count - len(WHEEL_NAMES)])
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,12 @@ class Stop:
 
     @property
     def side_slip(self) -> np.ndarray:
-        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where it is slower than SLOWEST."""
+        """Side slip angle (n,) in rad, from the vehicle's x axis to its velocity; 0 where it is slower than
+        SLOWEST_SLIP_SPEED.
+        """
         course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
         angle = np.remainder(course - self.path.states[:, 0, 2] + np.pi, 2.0 * np.pi) - np.pi
-        return np.where(self.speed > SLOWEST, angle, 0.0)
+        return np.where(self.speed > SLOWEST_SLIP_SPEED, angle, 0.0)
 
     @property
     def across(self) -> np.ndarray:
@@ -79,7 +81,7 @@ class Stop:
     def of_vehicle(self) -> dict[str, float]:
         """Results of the whole vehicle over a stop, by name and unit."""
         path, speed, way = self.path, self.speed, self.way
-        slip, lateral = _peak(self.side_slip), _peak(self.across)
+        slip, lateral = _index_of_peak(self.side_slip), _index_of_peak(self.across)
         time, distance = float(path.times[-1]), float(way[-1])
         return {
             "initial speed [m/s]": float(speed[0]),
@@ -88,7 +90,9 @@ class Stop:
             "x [m]": float(path.states[-1, 0, 0] - path.states[0, 0, 0]),
             "y [m]": float(path.states[-1, 0, 1] - path.states[0, 0, 1]),
             "final yaw [deg]": float(np.degrees(path.states[-1, 0, 2] - path.states[0, 0, 2])),
-            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance) if path.stands else float("nan"),
+            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance)
+            if path.ended_at_rest
+            else float("nan"),
             "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
             "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
             "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
@@ -111,8 +115,8 @@ class Stop:
             return {}
         roll, pitch = np.degrees(self.lean).T
         return {
-            "largest roll [deg]": float(roll[_peak(roll)]),
-            "largest pitch [deg]": float(pitch[_peak(pitch)]),
+            "largest roll [deg]": float(roll[_index_of_peak(roll)]),
+            "largest pitch [deg]": float(pitch[_index_of_peak(pitch)]),
             "least wheel load [N]": float(self.path.reports.load.min()),
         }
 
@@ -124,7 +128,7 @@ class Stop:
         places = self.path.states[:, 0]
         if self.lean is None:
             return places
-        yaws = [2, *(i for i, name in enumerate(self.path.coordinates) if name.endswith(HITCH))]
+        yaws = [2, *(i for i, name in enumerate(self.path.coordinates) if name.endswith(HITCH_SUFFIX))]
         return np.column_stack((places[:, :2], np.cumsum(places[:, yaws], axis=1)))
 
     @property
@@ -140,7 +144,7 @@ class Stop:
         hitch = self.hitch
         if hitch is None:
             return {}
-        largest = _peak(hitch)
+        largest = _index_of_peak(hitch)
         return {
             "largest hitch angle [deg]": float(np.degrees(hitch[largest])),
             "largest hitch angle at [s]": float(self.times[largest]),
@@ -148,17 +152,19 @@ class Stop:
         }
 
     def of_wheels(self) -> dict[str, np.ndarray]:
-        """Results of each wheel (W,) at speeds above SLOWEST, or above half of a lower initial speed, by name and
-        unit."""
-        path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
+        """Results of each wheel (W,) at speeds above SLOWEST_SLIP_SPEED, or above half of a lower initial speed, by
+        name and unit."""
+        path, fast = self.path, self.speed[:-1] > min(SLOWEST_SLIP_SPEED, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports.slip[fast]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
         wheels = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
-        wheels |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
+        wheels |= {
+            f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in SLIP_LIMITS
+        }
         locks = self.locks()
         return wheels | {
             "locked above 15 km/h [s]": locks.time,
-            "longest lock [s]": locks.longest,
+            "longest lock [s]": locks.longest_lock,
             "mean pressure [bar]": lengths @ pressures / whole,
             "final pressure [bar]": path.pressures[-1],
         }
@@ -188,6 +194,6 @@ class Stop:
         return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
-def _peak(values: np.ndarray) -> int:
+def _index_of_peak(values: np.ndarray) -> int:
     """Index of the value with the largest magnitude."""
     return int(np.argmax(np.abs(values)))

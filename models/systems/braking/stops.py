@@ -10,13 +10,13 @@ import numpy as np
 
 from models.core.discretisation import Estimate, by_chance
 from models.core.errors import RunFailed
-from models.core.noise import SPEED, normal
+from models.core.noise import SPEED, normal_samples
 from models.ensemble.runner import PathFailed
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
 from models.systems.braking.stop_report import Stop
 
-KEPT = {
+KEPT_QUANTITIES = {
     "distance": "stopping distance [m]",
     "time": "stopping time [s]",
     "deceleration": "v0/T [m/s^2]",
@@ -24,7 +24,7 @@ KEPT = {
     "yaw": "final yaw [deg]",
 }
 """Names of arrays, and the quantities of every stop that they hold."""
-COURSE = {"aside": 1.0, "yaw": 5.0}
+COURSE_SIZES = {"aside": 1.0, "yaw": 5.0}
 """m, deg: standard errors of a mean course that is less are shares of this."""
 
 
@@ -42,10 +42,10 @@ class Stops:
     seed: int
 
     def __call__(self, paths: range) -> dict[str, np.ndarray]:
-        """Named arrays (len(paths),) of ``KEPT`` and of the initial speed (m/s)."""
+        """Named arrays (len(paths),) of ``KEPT_QUANTITIES`` and of the initial speed (m/s)."""
         scene = build(self.table, self.file, Path(self.folder))
-        rows = [self._stopped(scene, number) for number in paths]
-        kept = {**KEPT, "speed": "initial speed [m/s]"}
+        rows = [self._quantities_of_stop(scene, number) for number in paths]
+        kept = {**KEPT_QUANTITIES, "speed": "initial speed [m/s]"}
         return {name: np.array([row[key] for row in rows]) for name, key in kept.items()}
 
     def facts(self) -> dict[str, Any]:
@@ -57,16 +57,16 @@ class Stops:
             "seed": self.seed,
         }
 
-    def _stopped(self, scene: BrakingScene, number: int) -> dict[str, float]:
+    def _quantities_of_stop(self, scene: BrakingScene, number: int) -> dict[str, float]:
         procedure = scene.procedures[self.procedure]
-        drawn = float(normal(self.seed, number, 1, 1, source=SPEED)[0, 0])
+        drawn = float(normal_samples(self.seed, number, 1, 1, source=SPEED)[0, 0])
         changed = procedure.model_copy(update={"speed": procedure.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:
             path = run(scene, procedure=self.procedure).detail
         except RunFailed as error:
             raise PathFailed(number, str(error)) from None
-        if not path.stands:
+        if not path.ended_at_rest:
             raise PathFailed(number, f"does not stand after {scene.run.duration:g} s")
         return Stop(path).of_vehicle()
 
@@ -85,18 +85,18 @@ class Scatter:
         return self.deviation / sqrt(self.count)
 
 
-def scatter(values: np.ndarray) -> Scatter:
+def scatter_of(values: np.ndarray) -> Scatter:
     """Count, mean and standard deviation of values (n,), n at least 2."""
     return Scatter(values.size, float(values.mean()), float(values.std(ddof=1)))
 
 
-def chances(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
-    """Statistical errors of the mean results: the standard error divided by the mean, or by COURSE where the mean is
-    smaller.
+def statistical_errors(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
+    """Statistical errors of the mean results: the standard error divided by the mean, or by COURSE_SIZES where the mean
+    is smaller.
     """
-    units = {key: label.partition("[")[2][:-1] for key, label in KEPT.items()}
+    units = {key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}
     return {
-        key: by_chance(scatter.error, max(abs(scatter.mean), COURSE.get(key, 0.0)), units[key], scatter.count)
+        key: by_chance(scatter.error, max(abs(scatter.mean), COURSE_SIZES.get(key, 0.0)), units[key], scatter.count)
         for key, scatter in scatters.items()
         if key in units
     }
@@ -110,10 +110,10 @@ class Welch:
     half_width: float
     t: float
     freedoms: float
-    p: float
+    p_value: float
 
 
-def welch(first: Scatter, second: Scatter) -> Welch:
+def welch_test(first: Scatter, second: Scatter) -> Welch:
     """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
     from scipy.stats import t as student
 

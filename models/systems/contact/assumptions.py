@@ -11,11 +11,11 @@ from models.contact.limits import CONSTANT_FRICTION, HALF_SPACE, NO_SLIP, SMALL_
 from models.contact.theories import Fastsim, LinearTheory, OnEllipse, OnPatches, RollingContact
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.core.tables import METRES, blocks
+from models.core.tables import METRES, table_blocks
 from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES
 from models.systems.contact.scene import ContactScene
 
-ALIKE = 0.02
+DISSIMILARITY_COST = 0.02
 """Of mu N: what it may cost to leave out that two bodies differ."""
 
 
@@ -23,9 +23,9 @@ def assumptions(scene: ContactScene, body: RollingContact) -> list[Assumption]:
     """Assumptions that the scene's theory makes of its contact."""
     listed = [*of_pressing(scene, body), *_creepages(body)]
     if isinstance(body, LinearTheory):
-        listed.append(_no_slip(lambda run: {"contact": _utilised_friction(run, body)}))
+        listed.append(_no_slip_assumption(lambda run: {"contact": _utilised_friction(run, body)}))
     if isinstance(body, LinearTheory | Fastsim):
-        listed.append(_slender(lambda run: {"contact": np.array([body.a / body.b])}))
+        listed.append(_slender_assumption(lambda run: {"contact": np.array([body.a / body.b])}))
     if body.pair.mismatch != 0.0 and body.friction > 0.0:
         listed.append(_bodies_alike(body))
     return listed
@@ -35,19 +35,19 @@ def of_pressing(scene: ContactScene, body: RollingContact) -> list[Assumption]:
     """Assumptions about bodies that are pressed together, whether they roll or not."""
     listed = [_half_space(_by_radii(scene, body))]
     if yields(scene.bodies.wheel, scene.bodies.rail):
-        listed.append(_elastic(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
+        listed.append(_elastic_assumption(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
     return listed + (_on_profiles(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
 
 
 def table_assumptions(file: Path) -> list[Assumption]:
     """Assumptions of the contacts in a table of cases, judged by the rows that a result keeps: its first block."""
-    rows = next(iter(blocks(file, (BY_AXES, BY_CURVATURES))), None)
+    rows = next(iter(table_blocks(file, (BY_AXES, BY_CURVATURES))), None)
     values = {} if rows is None else {name: np.asarray(column, float) for name, column in rows.values.items()}
     listed = []
     if "a" in values:
         a, b = values["a"], values["b"]
         peak = 1.5e-6 * values["load"] / (np.pi * a * b)
-        listed = [_slender(lambda run: {"rows": a / b}), _elastic(lambda run: {"rows": peak})]
+        listed = [_slender_assumption(lambda run: {"rows": a / b}), _elastic_assumption(lambda run: {"rows": peak})]
     creepages = {name: values.get(name, np.zeros(0)) for name in ("xi_x", "xi_y")}
     return [*listed, _small_creepage(lambda run: creepages), _constant_friction(lambda run: creepages)]
 
@@ -59,7 +59,7 @@ def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
         "lower the load, or compute with finite elements",
         watched,
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
@@ -85,14 +85,14 @@ def _by_radii(scene: ContactScene, body: RollingContact) -> Callable[[Result], W
     return lambda run: arrays
 
 
-def _elastic(watched: Callable[[Result], Watched]) -> Assumption:
+def _elastic_assumption(watched: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "elastic",
         "the steel does not flow",
         "lower the load or take larger radii: a real contact would be larger and its pressure lower",
         watched,
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -118,7 +118,7 @@ def _small_creepage(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> As
         "lower the creepage: a wheel that slides is no rolling contact",
         lambda run: {name: np.abs(values) for name, values in watched(run).items()},
         "",
-        most=SMALL_CREEPAGE,
+        upper_limit=SMALL_CREEPAGE,
     )
 
 
@@ -129,18 +129,18 @@ def _constant_friction(watched: Callable[[Result], Mapping[str, np.ndarray]]) ->
         "name the effect falling_friction, which FASTSIM computes",
         lambda run: {name: np.abs(values) for name, values in watched(run).items()},
         "",
-        most=CONSTANT_FRICTION,
+        upper_limit=CONSTANT_FRICTION,
     )
 
 
-def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
+def _no_slip_assumption(watched: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "no slip",
         "the force of the linear theory is far below mu N",
         'name the effect saturation: method.name = "fastsim"',
         watched,
         "mu N",
-        most=NO_SLIP,
+        upper_limit=NO_SLIP,
     )
 
 
@@ -150,7 +150,7 @@ def _utilised_friction(run: Result, body: RollingContact) -> np.ndarray:
     return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
 
 
-def _slender(watched: Callable[[Result], Watched]) -> Assumption:
+def _slender_assumption(watched: Callable[[Result], Watched]) -> Assumption:
     return Assumption(
         "axes alike",
         "the ellipse is no more slender than those of Kalker's table",
@@ -169,7 +169,7 @@ def _bodies_alike(body: RollingContact) -> Assumption:
         "give both bodies the same material",
         lambda run: {"bodies": cost},
         "mu N",
-        most=ALIKE,
+        upper_limit=DISSIMILARITY_COST,
     )
 
 
@@ -189,7 +189,7 @@ def _on_profiles(body: OnPatches) -> list[Assumption]:
             "use longer profiles, a smaller load or lateral_shift",
             lambda run: inside,
             "mm from the end",
-            least=0.0,
+            lower_limit=0.0,
         ),
         Assumption(
             "patches apart",
@@ -197,6 +197,6 @@ def _on_profiles(body: OnPatches) -> list[Assumption]:
             'use system = "wheel-rail", which joins patches that have grown together',
             lambda run: {"neighbours": np.array(gaps) / METRES["mm"]},
             "mm",
-            least=0.0,
+            lower_limit=0.0,
         ),
     ]

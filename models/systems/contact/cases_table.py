@@ -28,16 +28,16 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.core.errors import InputError
-from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, blocks
+from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, RowBlock, table_blocks
 from models.core.whole_files import whole_file
 from models.ensemble.runner import in_order
 from models.ensemble.store import Arrays, Store
 from models.systems.contact.scene import Method
 
-MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
-BY_AXES = {"a": METRES, "b": METRES, **MOTION}
-BY_CURVATURES = {"A": PER_METRE, "B": PER_METRE, **MOTION}
-HEADER = (
+MOTION_COLUMNS = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
+BY_AXES = {"a": METRES, "b": METRES, **MOTION_COLUMNS}
+BY_CURVATURES = {"A": PER_METRE, "B": PER_METRE, **MOTION_COLUMNS}
+ANSWER_HEADINGS = (
     "line [-]",
     "fx [N]",
     "fy [N]",
@@ -50,15 +50,15 @@ HEADER = (
     "moment_error_of_theory [N m]",
     "status",
 )
-COLUMNS = tuple(head.partition(" ")[0] for head in HEADER[1:-1])
+ANSWER_COLUMNS = tuple(head.partition(" ")[0] for head in ANSWER_HEADINGS[1:-1])
 """Names of the columns of numbers, in the order of ``forces`` of ``solved_rows``."""
-SOUND = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g}", ",{:.4g},{:.4g},{:.4g},{:.4g}", ",ok\n"
+ROW_FORMAT = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g}", ",{:.4g},{:.4g},{:.4g},{:.4g}", ",ok\n"
 """A row: numbers, errors if they are asked for, status."""
-ERRORS = slice(6, 10)
+ERROR_COLUMNS = slice(6, 10)
 """Columns of errors."""
-BLOCK = 10_000
+ROWS_PER_BLOCK = 10_000
 """Rows of an answer that are read at once, and those that a result keeps."""
-AHEAD = 8
+BLOCKS_IN_ADVANCE = 8
 """Blocks under way at once."""
 Build = Callable[[Array, Array], Any]
 """Makes ``Built`` of the friction and the load (N) of some rows."""
@@ -84,14 +84,18 @@ def answer_table(
     build(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading, solve = (
-        blocks(path, (BY_AXES, BY_CURVATURES)),
+        table_blocks(path, (BY_AXES, BY_CURVATURES)),
         partial(solved_rows, build=build, method=method, errors=errors),
     )
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(output_path) as part, part.open("w") as file:
-        heads = HEADER if errors else tuple(head for head in HEADER if head not in HEADER[ERRORS])
+        heads = (
+            ANSWER_HEADINGS
+            if errors
+            else tuple(head for head in ANSWER_HEADINGS if head not in ANSWER_HEADINGS[ERROR_COLUMNS])
+        )
         file.write(",".join(heads) + "\n")
-        for block, answers in in_order(solve, chain(first, reading), executor, store, AHEAD):
+        for block, answers in in_order(solve, chain(first, reading), executor, store, BLOCKS_IN_ADVANCE):
             wrong = dict(zip(answers["wrong"].tolist(), answers["why"].tolist(), strict=True))
             rows = enumerate(zip(block.lines, answers["forces"].tolist(), strict=True))
             file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)
@@ -104,27 +108,31 @@ def answer_table(
 def compile_first(build: Build, method: Method) -> None:
     """Compile or load the kernels, so that the measured time is that of the rows alone."""
     unit = np.ones(1)
-    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, build, method)
+    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION_COLUMNS, unit)}, build, method)
 
 
 def solved_rows(block: RowBlock, build: Build, method: Method, errors: bool) -> Arrays:
     """Answers to a block of rows: ``forces`` (rows, columns), the numbers ``wrong`` (m,) of refused rows, and reasons
     ``why`` (m,).
     """
-    columns = len(HEADER) - 2 - (0 if errors else ERRORS.stop - ERRORS.start)
-    forces, wrong = _answered(block, partial(_forces, build=build, method=method, errors=errors), columns)
+    columns = len(ANSWER_HEADINGS) - 2 - (0 if errors else ERROR_COLUMNS.stop - ERROR_COLUMNS.start)
+    forces, wrong = _answers_or_refusals(block, partial(_forces, build=build, method=method, errors=errors), columns)
     return {"forces": forces, "wrong": np.array([*wrong], dtype=int), "why": np.array([*wrong.values()], dtype=str)}
 
 
-def _answered(block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:
+def _answers_or_refusals(
+    block: RowBlock, solve: Callable[[dict[str, Any]], Array], columns: int
+) -> tuple[Array, dict[int, str]]:
     """Answers (rows, columns), NaN in refused rows, and the reason for each refusal by the number of its row."""
-    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.wrong)
+    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.faulty_rows)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
-    answers[good], refused = _sound({name: column[good] for name, column in block.values.items()}, solve, columns)
+    answers[good], refused = _answers_of_rows(
+        {name: column[good] for name, column in block.values.items()}, solve, columns
+    )
     return answers, wrong | {int(good[i]): text for i, text in refused.items()}
 
 
-def _sound(
+def _answers_of_rows(
     values: dict[str, Array], solve: Callable[[dict[str, Any]], Array], columns: int
 ) -> tuple[Array, dict[int, str]]:
     """Answers to all rows, and reasons by row where the theory refuses one. Refused rows are found by halving the
@@ -140,7 +148,7 @@ def _sound(
             return np.full((1, columns), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
     (low, wrong), (high, others) = (
-        _sound({name: column[rows] for name, column in values.items()}, solve, columns)
+        _answers_of_rows({name: column[rows] for name, column in values.items()}, solve, columns)
         for rows in (slice(half), slice(half, None))
     )
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
@@ -148,7 +156,7 @@ def _sound(
 
 def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool = True) -> Array:
     """Answers (rows, columns); raises InputError if a row is outside the range of the theory."""
-    load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
+    load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION_COLUMNS)
     touching = build(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
     if touching.falling is not None:
@@ -167,11 +175,13 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
         share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
-        forces += _errors(fine, coarse, limit, a, b, share, method)
+        forces += _force_errors(fine, coarse, limit, a, b, share, method)
     return np.column_stack(forces) + 0.0
 
 
-def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Array, method: Method) -> list[Array]:
+def _force_errors(
+    fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Array, method: Method
+) -> list[Array]:
     """Errors of forces (N) and moments (N m) from the finite cells and from the theory; limit : mu N; share : spin's
     share of the creepage.
     """
@@ -190,13 +200,13 @@ def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Arr
 def _line(line_number: int, row: list[float], wrong: str | None) -> str:
     """One row of the answer's file; a text that says what is wrong is put into quotation marks."""
     if wrong is None:
-        numbers, errors, status = SOUND
-        return (numbers + (errors if len(row) > ERRORS.start else "") + status).format(line_number, *row)
+        numbers, errors, status = ROW_FORMAT
+        return (numbers + (errors if len(row) > ERROR_COLUMNS.start else "") + status).format(line_number, *row)
     text = wrong.replace('"', "'")
     return f'{line_number}{"," * (len(row) + 1)}"{text}"\n'
 
 
-def sizes(path: Path) -> dict[str, dict[str, Any]]:
+def column_sizes(path: Path) -> dict[str, dict[str, Any]]:
     """Largest magnitude and rms of every column of an answer, with its unit, over the rows without error; read block by
     block.
     """
@@ -204,7 +214,7 @@ def sizes(path: Path) -> dict[str, dict[str, Any]]:
         rows = csv.reader(file)
         heads = [_name_and_unit(head) for head in next(rows)[1:-1]]
         largest, squares, count = np.zeros(len(heads)), np.zeros(len(heads)), 0
-        while block := list(islice(rows, BLOCK)):
+        while block := list(islice(rows, ROWS_PER_BLOCK)):
             sound = np.array([row[1:-1] for row in block if row[-1] == "ok"], float).reshape(-1, len(heads))
             largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
             squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
@@ -216,9 +226,9 @@ def sizes(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def kept_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
-    """Columns name -> (unit, values) of the first BLOCK rows of an answer; numbers of wrong rows are NaN."""
+    """Columns name -> (unit, values) of the first ROWS_PER_BLOCK rows of an answer; numbers of wrong rows are NaN."""
     with path.open(newline="") as file:
-        heads, *rows = islice(csv.reader(file), BLOCK + 1)
+        heads, *rows = islice(csv.reader(file), ROWS_PER_BLOCK + 1)
     *columns, status = np.array(rows, dtype=object).reshape(-1, len(heads)).T
     columns = [np.array([float(cell or "nan") for cell in column]) for column in columns]
     named = {name: (unit, values) for (name, unit), values in zip(map(_name_and_unit, heads), columns, strict=False)}

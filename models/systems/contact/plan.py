@@ -6,10 +6,10 @@ from models.contact.limits import HALF_SPACE
 from models.core.assumptions import Assumption, assumption_lines
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.contact.scene import ContactScene
 
-THEORIES = {
+THEORY_TEXTS = {
     "linear": "Kalker's linear theory: no slip, exact for small creepage",
     "fastsim": "Kalker's simplified theory on an ellipse (1982)",
     "simplified": "Kalker's simplified theory for an undeformed distance (1983)",
@@ -49,19 +49,19 @@ def describe(scene: ContactScene) -> str:
     heads = {
         "scene": f"{scene.file}, study {scene.study}",
         **bodies,
-        scene.geometry: _values(getattr(scene, scene.geometry)),
+        scene.geometry: _values_text(getattr(scene, scene.geometry)),
     }
     if scene.contact is not None:
-        heads["contact"] = _values(scene.contact)
+        heads["contact"] = _values_text(scene.contact)
     if scene.falling_friction is not None:
         law = "by the speed of slip s: floor + (1 - floor) exp(-decay s) of it is left"
-        heads["friction"] = f"{law}; {_values(scene.falling_friction)}"
+        heads["friction"] = f"{law}; {_values_text(scene.falling_friction)}"
     if scene.contact is not None:
-        heads["creepage"] = _values(scene.creepage)
+        heads["creepage"] = _values_text(scene.creepage)
     if scene.sweep is not None:
-        heads["sweep"] = _values(scene.sweep)
-    method = _values(scene.method, {"name", *scene.method.unread()})
-    heads["theory"] = THEORIES[scene.method.name] + (f"; {method}" if method else "")
+        heads["sweep"] = _values_text(scene.sweep)
+    method = _values_text(scene.method, {"name", *scene.method.unread()})
+    heads["theory"] = THEORY_TEXTS[scene.method.name] + (f"; {method}" if method else "")
     lines = [scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)]
     return "\n".join([*lines, *assumption_lines(_assumed(scene))])
 
@@ -73,13 +73,13 @@ def _assumed(scene: ContactScene) -> list[Assumption]:
     with suppress(InputError, RunFailed):
         if scene.cases is not None:
             return table_assumptions(scene.cases_file())
-        from models.systems.contact.run import contact
+        from models.systems.contact.run import solved_contact
 
-        return assumptions(scene, contact(scene))
+        return assumptions(scene, solved_contact(scene))
     return []
 
 
-def _values(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
+def _values_text(table: object, omitted_keys: frozenset[str] | set[str] = frozenset()) -> str:
     """Text of a table: its keys, values and units, without keys that are not given."""
     model = type(table)
     parts = []

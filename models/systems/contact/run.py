@@ -34,20 +34,20 @@ from models.contact.wheel_on_rail import TouchingPlace, Track, Wheelset, wheel_o
 from models.core.assumptions import with_assumptions
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
-from models.core.scene_effects import extended
-from models.core.tables import BLOCK as TABLE_BLOCK
+from models.core.scene_effects import extended_by_effects
+from models.core.tables import ROWS_PER_BLOCK as TABLE_BLOCK
 from models.ensemble.store import Store, named_files
 from models.ensemble.workers import Crew, places_of
 from models.systems.contact.assumptions import assumptions
 from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
-from models.systems.contact.cases_table import answer_table, compile_first, kept_rows, sizes
+from models.systems.contact.cases_table import answer_table, column_sizes, compile_first, kept_rows
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
-FORCES = attrgetter("fx", "fy", "mz", "stick", "dissipation")
-ERRORS = attrgetter("cells", "theory", "moment_cells", "moment_theory")
-CHANNELS = {
+FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
+CONTACT_CHANNELS = {
     "xi_x": ("-", "longitudinal creepage"),
     "xi_y": ("-", "lateral creepage"),
     "spin": ("1/m", "spin by the rolling speed"),
@@ -61,13 +61,15 @@ CHANNELS = {
     "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
     "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
 }
-"""Units and meanings of a motion, of its forces (``FORCES``) and of their errors (``ERRORS``), in this order."""
-FIELDS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
-POWERS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
+"""Units and meanings of a motion, of its forces (``FORCES_OF_ROLLED``) and of their errors (``ERRORS_OF_ROLLED``), in
+this order.
+"""
+FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
+CELL_POWER = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
-BLOCKS = "blocks"
+BLOCKS_FOLDER = "blocks"
 """Folder of the finished blocks of a long table, beside its answers."""
-LARGE = 8_000_000
+LARGE_TABLE_BYTES = 8_000_000
 """Bytes of a table from which on its blocks are kept, and computed by several: four blocks or so."""
 Progress = Callable[[str, float], None]
 
@@ -91,7 +93,7 @@ class Built:
 
 
 @dataclass(frozen=True)
-class Rolls:
+class ContactResults:
     """A contact with its forces at every motion, and their errors if these were requested.
 
     pressing : seconds that the normal problem took; rolling (n,) : seconds for each motion, errors included.
@@ -114,7 +116,7 @@ def run(
     answers: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Result:
-    """Compute the forces of a scene at every creepage, with ``Rolls`` as detail; or answer its table of cases.
+    """Compute the forces of a scene at every creepage, with ``ContactResults`` as detail; or answer its table of cases.
 
     error : whether to state how far forces are off, which takes another evaluation of each on half the cells; what is
     assumed is judged always. fields : whether the
@@ -128,9 +130,9 @@ def run(
         return _of_table(scene, answers, progress, error)
     motions, cells = creepages(scene), scene.method.cells
     progress("loading", 0.0)
-    shown = rolled(contact(scene), motions[-1], cells, fields=True) if fields else None
+    shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
-    body = contact(scene)
+    body = solved_contact(scene)
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
@@ -140,15 +142,15 @@ def run(
     if shown is not None:
         steps[-1] = shown
     forces, off = zip(*steps, strict=True)
-    rolls = Rolls(body, motions, forces, off if error else (), marks[0] - start, np.diff(marks))
+    rolls = ContactResults(body, motions, forces, off if error else (), marks[0] - start, np.diff(marks))
     labelled = with_assumptions(_result(scene, rolls, seconds), assumptions(scene, body))
     return with_error(labelled, scene, body, off) if error else labelled
 
 
-def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
-    body, count, power = rolls.contact, len(rolls.motions), POWERS[scene.method.name]
-    errors: list[tuple[float, ...]] = [ERRORS(error) for error in rolls.errors] or [()] * count
-    rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
+def _result(scene: ContactScene, rolls: ContactResults, seconds: float) -> Result:
+    body, count, power = rolls.contact, len(rolls.motions), CELL_POWER[scene.method.name]
+    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in rolls.errors] or [()] * count
+    rows = zip(rolls.motions, map(FORCES_OF_ROLLED, rolls.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
     doubt = ""
     if isinstance(body, LinearTheory):
@@ -157,7 +159,10 @@ def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
             doubt = beyond_friction(used / (body.friction * body.pressing.load))
     return result(
         scene,
-        {name: Channel("motion", values, *CHANNELS[name]) for name, values in zip(CHANNELS, columns, strict=False)},
+        {
+            name: Channel("motion", values, *CONTACT_CHANNELS[name])
+            for name, values in zip(CONTACT_CHANNELS, columns, strict=False)
+        },
         {},
         counts={
             "steps": count,
@@ -171,14 +176,14 @@ def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
     )
 
 
-def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
+def cells_of(scene: ContactScene, rolls: ContactResults) -> Result | None:
     """Pressure and tractions in every cell in contact at the last motion, patch after patch; None without fields."""
     patches = rolls.rolled[-1].fields
     if not patches:
         return None
     columns = {
         name: Channel("cell", np.concatenate([getattr(patch, name)[patch.inside] for patch in patches]), unit)
-        for name, unit in FIELDS.items()
+        for name, unit in FIELD_UNITS.items()
     }
     return result(scene, columns, {}, motion=list(rolls.motions[-1]))
 
@@ -191,7 +196,7 @@ def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: boo
     counts = _answered(scene, answers, built, progress, error)
     seconds = time.perf_counter() - start
     rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
-    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
+    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(column_sizes(answers)))
     with_assumptions(table, assumptions_of_rows(scene.cases_file()))
     return with_error_of_rows(table, scene) if error else table
 
@@ -201,13 +206,13 @@ def _answered(scene: ContactScene, answers: Path, built: Any, progress: Progress
     finished blocks are stored.
     """
     file = scene.cases_file()
-    rows, several = _rows_of(file), file.stat().st_size > LARGE
-    count = partial(_count, progress, rows)
+    rows, several = _rows_of(file), file.stat().st_size > LARGE_TABLE_BYTES
+    count = partial(_count_rows, progress, rows)
     if not several:
         return answer_table(file, answers, built, scene.method, count, errors=error)
-    store = Store(answers.parent / BLOCKS)
+    store = Store(answers.parent / BLOCKS_FOLDER)
     facts = {"scene": scene.table(), "error": error, "files": named_files(scene.table(), Path(scene.folder))}
-    with store.claimed(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
+    with store.reserved_folder(facts), Crew.of(scene).at_work(rows // TABLE_BLOCK + 1, *places_of(scene)) as pool:
         return answer_table(file, answers, built, scene.method, count, errors=error, executor=pool, store=store)
 
 
@@ -217,13 +222,13 @@ def _rows_of(file: Path) -> int:
         return sum(part.count(b"\n") for part in iter(partial(lines.read, 1 << 20), b""))
 
 
-def _count(progress: Progress, most: int, rows: int) -> None:
+def _count_rows(progress: Progress, most: int, rows: int) -> None:
     progress(f"{rows:,} of {most:,} rows", min(rows / max(most, 1), 1.0))
 
 
 def table_contacts(scene: ContactScene, friction: Any, load: Any) -> Built:
     """The contacts in the rows of a table of cases."""
-    return extended(Built(scene.pair, friction, load), scene)
+    return extended_by_effects(Built(scene.pair, friction, load), scene)
 
 
 def scene_contact(scene: ContactScene) -> Built:
@@ -231,13 +236,13 @@ def scene_contact(scene: ContactScene) -> Built:
     table = scene.contact
     assert table is not None
     kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
-    profiles: dict[str, ContactProfile] = {kind: _profile(scene, kind) for kind in kinds}
-    return extended(
+    profiles: dict[str, ContactProfile] = {kind: _profile_by_name(scene, kind) for kind in kinds}
+    return extended_by_effects(
         Built(scene.pair, table.friction, table.load, table.approach, scene.falling_friction, profiles), scene
     )
 
 
-def contact(scene: ContactScene) -> RollingContact:
+def solved_contact(scene: ContactScene) -> RollingContact:
     """The scene's contact after its normal problem is solved, with the theory that the scene names."""
     method, built = scene.method, scene_contact(scene)
     friction, pair = built.friction, built.pair
@@ -249,7 +254,7 @@ def contact(scene: ContactScene) -> RollingContact:
             "has constant friction, and an effect of this scene makes it fall: use fastsim",
         )
     if scene.profiles is not None:
-        patches = [touch.patch for touch in touches(scene, built)]
+        patches = [touch.patch for touch in touching_places(scene, built)]
         pressed = press(patches, pair, load=built.load, approach=built.approach)
         return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
     hertz = hertz_of(scene)
@@ -277,7 +282,7 @@ def interpenetrating(hertz: Hertz, material_pair: MaterialPair, options: Simplif
     return press(quadratic(A, B, x, y), material_pair, load=float(hertz.load), options=options)
 
 
-def touches(scene: ContactScene, built: Built) -> list[TouchingPlace]:
+def touching_places(scene: ContactScene, built: Built) -> list[TouchingPlace]:
     """Places at which the wheel's and the rail's profile touch."""
     p = scene.profiles
     assert p is not None
@@ -291,7 +296,7 @@ def touches(scene: ContactScene, built: Built) -> list[TouchingPlace]:
     )
 
 
-def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProfile:
+def _profile_by_name(scene: ContactScene, kind: Literal["wheel", "rail"]) -> ContactProfile:
     """A built-in profile by its name, or the user's file."""
     assert scene.profiles is not None
     name = getattr(scene.profiles, kind)

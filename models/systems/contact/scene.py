@@ -15,7 +15,7 @@ from models.core.scene_effects import check, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 
-GEOMETRIES = ("ellipse", "curvatures", "radii", "profiles", "cases")
+GEOMETRY_TABLES = ("ellipse", "curvatures", "radii", "profiles", "cases")
 """Tables that say where the bodies touch; a scene has one of them."""
 
 
@@ -146,7 +146,7 @@ class Method(Strict):
 
 
 class ContactScene(SceneFile):
-    """One scene of rolling contact. Exactly one of the tables ``GEOMETRIES`` is there."""
+    """One scene of rolling contact. Exactly one of the tables ``GEOMETRY_TABLES`` is there."""
 
     system: Literal["contact"] = "contact"
     study: str = Field(default="contact", description="the study that runs the scene")
@@ -166,7 +166,7 @@ class ContactScene(SceneFile):
     @property
     def geometry(self) -> str:
         """Name of the one table that says where the bodies touch."""
-        return next(name for name in GEOMETRIES if getattr(self, name) is not None)
+        return next(name for name in GEOMETRY_TABLES if getattr(self, name) is not None)
 
     def cases_file(self) -> Path:
         """Path of the file with the table of cases."""
@@ -182,35 +182,35 @@ class ContactScene(SceneFile):
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(ContactScene, table, file, folder)
-    _refuse(scene, _geometry, _contact, _sizes, _sweep, _method)
+    _refuse_places(scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method)
     complete = with_own(scene)
     check(complete)
-    _refuse(scene, _friction)
+    _refuse_places(scene, _friction)
     return complete
 
 
-Wrong = Iterator[tuple[str, Any, str]]
+WrongPlaces = Iterator[tuple[str, Any, str]]
 """Places of a scene, their values and what is allowed there; the first is told."""
 
 
-def _refuse(scene: ContactScene, *checks: Callable[[ContactScene], Wrong]) -> None:
+def _refuse_places(scene: ContactScene, *checks: Callable[[ContactScene], WrongPlaces]) -> None:
     for place, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
         raise InputError(scene.file, place, value, allowed)
 
 
-def _geometry(scene: ContactScene) -> Wrong:
+def _geometry_refusals(scene: ContactScene) -> WrongPlaces:
     """Refusals of several geometries or none, and of a turned or mirrored rail and a wheel in mm, which are
     recognised.
     """
-    tables = [name for name in GEOMETRIES if getattr(scene, name) is not None]
+    tables = [name for name in GEOMETRY_TABLES if getattr(scene, name) is not None]
     if len(tables) != 1:
-        known = ", ".join(GEOMETRIES)
+        known = ", ".join(GEOMETRY_TABLES)
         yield "", None, f"one of the tables {known} says where the bodies touch; found {', '.join(tables) or 'none'}"
     if scene.radii is not None:
         scene.radii.curvatures(scene.file)
     if (profiles := scene.profiles) is None:
         return
-    for key, (least, most, unit) in RANGES.items():
+    for key, (least, most, unit) in PROFILE_RANGES.items():
         value = getattr(profiles, key)
         if not least <= value <= most:
             yield f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}"
@@ -218,7 +218,7 @@ def _geometry(scene: ContactScene) -> Wrong:
         yield "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles"
 
 
-RANGES = {
+PROFILE_RANGES = {
     "inclination": (-0.5, 0.5, "rad"),
     "radius": (0.02, 5.0, "m"),
     "gauge": (0.1, 3.0, "m"),
@@ -228,7 +228,7 @@ RANGES = {
 """Of numbers of profiles, in their unit."""
 OF_CASES = {"contact", "creepage", "sweep"}
 """Tables whose content every row of a table of cases has itself."""
-LARGEST = {
+LARGEST_INPUTS = {
     "contact.load": LARGEST_LOAD,
     "contact.approach": LARGEST_APPROACH,
     "contact.friction": 10.0,
@@ -239,7 +239,7 @@ LARGEST = {
 """What the theories take, of either sign."""
 
 
-def _contact(scene: ContactScene) -> Wrong:
+def _contact_refusals(scene: ContactScene) -> WrongPlaces:
     contact = scene.contact
     if scene.cases is not None:
         for table in sorted(scene.model_fields_set & OF_CASES):
@@ -250,9 +250,11 @@ def _contact(scene: ContactScene) -> Wrong:
         yield "contact.load", contact.load, "give either the load in N or contact.approach in m"
 
 
-def _sizes(scene: ContactScene) -> Wrong:
-    """Refusals of values beyond LARGEST: the theories refuse these, too, but do not know the file and the key."""
-    for place, most in LARGEST.items():
+def _size_refusals(scene: ContactScene) -> WrongPlaces:
+    """Refusals of values beyond LARGEST_INPUTS: the theories refuse these, too, but do not know the file and the
+    key.
+    """
+    for place, most in LARGEST_INPUTS.items():
         table, key = place.split(".")
         values = {place: getattr(getattr(scene, table), key, None)}
         if scene.sweep is not None and scene.sweep.of == key:
@@ -263,7 +265,7 @@ def _sizes(scene: ContactScene) -> Wrong:
                 yield where, value, f"must be at most {most:g}{unit}, of either sign"
 
 
-def _sweep(scene: ContactScene) -> Wrong:
+def _sweep_refusals(scene: ContactScene) -> WrongPlaces:
     if (sweep := scene.sweep) is None:
         return
     if sweep.start == sweep.stop:
@@ -279,7 +281,7 @@ ON_PROFILES = ("simplified", "exact")
 """Theories that need no ellipse."""
 
 
-def _method(scene: ContactScene) -> Wrong:
+def _method(scene: ContactScene) -> WrongPlaces:
     """Refusals of keys that the theory does not read, and of a theory that does not suit the geometry."""
     method = scene.method
     for key in sorted(method.model_fields_set & method.unread()):
@@ -290,7 +292,7 @@ def _method(scene: ContactScene) -> Wrong:
         yield "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
 
 
-def _friction(scene: ContactScene) -> Wrong:
+def _friction(scene: ContactScene) -> WrongPlaces:
     """Refusals of falling friction in a table of cases, and in a march that is not of second order."""
     march = scene.method.march
     if scene.falling_friction is None:

@@ -6,13 +6,13 @@ import numpy as np
 
 from models.contact.accuracy import Error
 from models.contact.theories import LinearTheory, RollingContact
-from models.core.discretisation import Estimate, by_cells, not_estimated, of_theory, stated
+from models.core.discretisation import Estimate, by_cells, not_estimated, of_theory, with_stated_errors
 from models.core.result import Result
 from models.systems.contact.scene import ContactScene
 
 MOST_CELLS = 400
-HALF = "half the cells along each axis"
-BANDS = "which 95 % of such contacts keep to"
+HALVED_CELLS = "half the cells along each axis"
+BAND_TEXT = "which 95 % of such contacts keep to"
 
 
 def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: Sequence[Error]) -> Result:
@@ -21,30 +21,36 @@ def with_error(run: Result, scene: ContactScene, body: RollingContact, errors: S
     Relative errors refer to the root mean square of the force; for the moment, which may vanish, to that times the
     contact's lever. Raises RunFailed where the cells are too few.
     """
-    force = rms(np.hypot(run["fx"], run["fy"]))
+    force = finite_rms(np.hypot(run["fx"], run["fy"]))
     sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
     likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
     cells, order = scene.method.cells, min(body.order, 1.5)
-    told = {name: by_cells(rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely}
+    told = {
+        name: by_cells(finite_rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely
+    }
     if isinstance(body, LinearTheory):
         not_estimated(run, "the linear theory has no cells")
     else:
-        stated(run, told, HALF)
-    theory = rms(run["error_of_theory"])
-    return of_theory(run, {"force": _of_theory(theory, force)}, BANDS) if theory > 0.0 else run
+        with_stated_errors(run, told, HALVED_CELLS)
+    theory = finite_rms(run["error_of_theory"])
+    return of_theory(run, {"force": _of_theory(theory, force)}, BAND_TEXT) if theory > 0.0 else run
 
 
 def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
     """The result of a table of cases with the errors of the rows that it keeps: root mean squares of the error of the
     cells and of that of the theory, which at least 95 % of cases keep to.
     """
-    force = rms(np.hypot(table["fx"], table["fy"]))
+    force = finite_rms(np.hypot(table["fx"], table["fy"]))
     cells, order = scene.method.cells, min(scene.method.order, 1.5)
-    stated(table, {"force": by_cells(rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)}, HALF)
-    return of_theory(table, {"force": _of_theory(rms(table["error_of_theory"]), force)}, BANDS)
+    with_stated_errors(
+        table,
+        {"force": by_cells(finite_rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)},
+        HALVED_CELLS,
+    )
+    return of_theory(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
 
 
-def rms(values: np.ndarray) -> float:
+def finite_rms(values: np.ndarray) -> float:
     """Root mean square of the finite values, 0 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 0.0

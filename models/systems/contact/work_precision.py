@@ -20,17 +20,17 @@ from models.contact.linear_theory import coefficients
 from models.contact.material import MaterialPair
 from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_cells, stated
+from models.core.discretisation import by_cells, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
 from models.systems.contact.assumptions import of_pressing
 from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.stated_error import MOST_CELLS, rms
+from models.systems.contact.stated_error import MOST_CELLS, finite_rms
 
 Parts = tuple[float, float, float]
-KINDS: dict[str, Parts] = {
+CREEPAGE_KINDS: dict[str, Parts] = {
     "x": (1, 0, 0),
     "y": (0, 1, 0),
     "spin": (0, 0, 1),
@@ -42,10 +42,10 @@ KINDS: dict[str, Parts] = {
     "x-y+spin": (1, -1, 1),
 }
 """Parts of the three creepages, each in units of its linear scale."""
-FINEST, ENOUGH = (40, 80), 0.005
+EXACT_GRID_CELLS, GRID_ERROR_LIMIT = (40, 80), 0.005
 """Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
 taken where that error, divided by mu N, is larger."""
-Roll = Callable[[Motion], Any]
+ForcesOfMotion = Callable[[Motion], Any]
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class ContactCase:
         return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
-def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = FINEST) -> ContactCase:
+def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = EXACT_GRID_CELLS) -> ContactCase:
     """The case with its exact forces. They are extrapolated to vanishing cells, and the error that remains is stated.
 
     Raises RunFailed where the exact theory is not solved even on the coarsest grids.
@@ -111,7 +111,7 @@ def with_exact_forces(case: ContactCase, finest: tuple[int, ...] = FINEST) -> Co
                 raise
             break
         best, error = without_grid([np.array([rolling.fx, rolling.fy, rolling.mz]) / scale for rolling in rolled])
-        if error < ENOUGH:
+        if error < GRID_ERROR_LIMIT:
             break
     return replace(case, fx=float(best[0]), fy=float(best[1]), mz=float(best[2]), error=error)
 
@@ -137,42 +137,47 @@ class TheorySettings:
 
     name: str
     cells: tuple[int, ...]
-    rolled: Callable[[ContactCase, int], Roll]
+    rolled: Callable[[ContactCase, int], ForcesOfMotion]
 
 
-def _fastsim(**choices: Any) -> Callable[[ContactCase, int], Roll]:
-    def rolled(case: ContactCase, cells: int) -> Roll:
+def _fastsim(**choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
         ellipse = Ellipse(case.a / case.b, case.pair, cells=cells, **choices)
         return lambda motion: ellipse(case.a, case.load, case.friction, *motion)
 
     return rolled
 
 
-def _simplified(case: ContactCase, cells: int) -> Roll:
+def _simplified(case: ContactCase, cells: int) -> ForcesOfMotion:
     pressed = interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair)
     contact = Simplified(pressed, case.friction)
     return lambda motion: contact.roll(motion, cells)
 
 
-def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], Roll]:
-    def rolled(case: ContactCase, cells: int) -> Roll:
+def _rolled_by_theory(theory: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    def rolled(case: ContactCase, cells: int) -> ForcesOfMotion:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
 
     return rolled
 
 
-FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
+SECOND_ORDER_CELLS, PLAIN_MARCH_CELLS, SIMPLIFIED_CELLS, EXACT_CELLS = (
+    (7, 11, 15, 21, 41),
+    (7, 11, 21, 41, 81),
+    (11, 21, 45),
+    (10, 20, 40),
+)
 """Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
-WAYS = (
+THEORIES_COMPARED = (
     TheorySettings("linear theory", (1,), _rolled_by_theory(LinearTheory)),
-    TheorySettings("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
-    TheorySettings("FASTSIM, plain march", FINE, _fastsim(march="plain")),
-    TheorySettings("FASTSIM", FAST, _fastsim()),
-    TheorySettings("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
-    TheorySettings("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
-    TheorySettings("theory of 1983", NET, _simplified),
-    TheorySettings("exact theory", GRID, _rolled_by_theory(ExactOnEllipse)),
+    TheorySettings("FASTSIM 1982", PLAIN_MARCH_CELLS, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
+    TheorySettings("FASTSIM, plain march", PLAIN_MARCH_CELLS, _fastsim(march="plain")),
+    TheorySettings("FASTSIM", SECOND_ORDER_CELLS, _fastsim()),
+    TheorySettings("FASTSIM, three flexibilities", SECOND_ORDER_CELLS, _fastsim(flexibilities="three")),
+    TheorySettings("FASTSIM, parabolic", SECOND_ORDER_CELLS, _fastsim(bound="parabolic")),
+    TheorySettings("theory of 1983", SIMPLIFIED_CELLS, _simplified),
+    TheorySettings("exact theory", EXACT_CELLS, _rolled_by_theory(ExactOnEllipse)),
 )
 
 
@@ -205,7 +210,7 @@ def measure(theory: TheorySettings, cells: int, cases: list[ContactCase], repeat
     """
     errors, seconds = [], []
     for case in cases:
-        answer, taken = _timed(theory.rolled(case, cells), case.motion, repeats)
+        answer, taken = _value_and_seconds(theory.rolled(case, cells), case.motion, repeats)
         errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
         seconds.append(taken)
     return TheoryPoint(theory.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
@@ -216,14 +221,14 @@ def force_of(answer: Any) -> Array:
     return np.array(answer[:2]) if isinstance(answer, tuple) else answer.force
 
 
-LEAST = 2e-5
+LEAST_TIMED_SECONDS = 2e-5
 """Seconds that a timing lasts at least."""
 
 
-def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
+def _value_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tuple[Any, float]:
     start = time.perf_counter()
     answer = roll(motion)
-    count = max(1, int(LEAST / max(time.perf_counter() - start, 1e-7)))
+    count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))
     taken = []
     for _ in range(repeats if count > 1 else 1):
         start = time.perf_counter()
@@ -233,7 +238,9 @@ def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
     return answer, float(np.median(taken))
 
 
-def cheapest(points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]) -> TheoryPoint | None:
+def fastest_point(
+    points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]
+) -> TheoryPoint | None:
     """The fastest of the points whose error is at most ``target``; None if there is none."""
     meets = [point for point in points if error(point) <= target]
     return min(meets, key=lambda point: point.seconds, default=None)
@@ -246,7 +253,7 @@ def ellipse_cases(
     friction: float,
     material_pair: MaterialPair,
     levels: tuple[float, ...],
-    kinds: dict[str, Parts] = KINDS,
+    kinds: dict[str, Parts] = CREEPAGE_KINDS,
 ) -> list[ContactCase]:
     """Cases of every kind and level on one ellipse, their exact forces not yet computed."""
     return [
@@ -255,7 +262,7 @@ def ellipse_cases(
     ]
 
 
-def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -> Result:
+def priced_theories(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -> Result:
     """Errors and seconds of every theory on every number of cells, on the scene's ellipse; the points are the detail.
 
     levels : sizes of the creepage; at 1 the linear theory reaches mu N.
@@ -266,8 +273,8 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))
         known.append(with_exact_forces(case))
-    for i, way in enumerate(WAYS):
-        progress(way.name, 0.5 + 0.5 * i / len(WAYS))
+    for i, way in enumerate(THEORIES_COMPARED):
+        progress(way.name, 0.5 + 0.5 * i / len(THEORIES_COMPARED))
         points += [measure(way, cells, known) for cells in way.cells]
     channels = {
         "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
@@ -278,11 +285,11 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
     }
     price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
     with_assumptions(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
-    left = by_cells(rms(price["uncertainty"]), 1.0, "mu N", max(FINEST), 1.0, MOST_CELLS)
-    return stated(price, {"exact force": left}, "three grids of the exact theory")
+    left = by_cells(finite_rms(price["uncertainty"]), 1.0, "mu N", max(EXACT_GRID_CELLS), 1.0, MOST_CELLS)
+    return with_stated_errors(price, {"exact force": left}, "three grids of the exact theory")
 
 
-TARGETS = (0.05, 0.02, 0.01, 0.005)
+ERROR_TARGETS = (0.05, 0.02, 0.01, 0.005)
 """Errors divided by mu N that are asked for."""
 
 
@@ -292,8 +299,8 @@ def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
     """
     errors = attrgetter("mean"), attrgetter("most")
     return [
-        (f"{100 * target:g} %", *(_point_text(cheapest(points, target, error), error) for error in errors))
-        for target in TARGETS
+        (f"{100 * target:g} %", *(_point_text(fastest_point(points, target, error), error) for error in errors))
+        for target in ERROR_TARGETS
     ]
 
 

@@ -11,17 +11,17 @@ from models.tyre.bristles import FADING_SPEED
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial import hitch_of
 
-LOADED = 2.5
+LARGEST_LOAD_RATIO = 2.5
 """Of the load at rest: up to about so much a tyre's cornering stiffness grows with its load (Pacejka, Tyre and Vehicle
 Dynamics, 4.3); that of the brush grows without end."""
-LEAN = 0.2
+LARGEST_LEAN = 0.2
 """rad: springs act along the upright of the road's plane, and its cosine is 2 % below 1 here."""
-SLIDING, SLIP, SLIDES = 4.0, 0.2, 0.1
+SLIDING_SPEED, SLIDING_SPEED_SHARE, SLIDING_WEIGHT_SHARE = 4.0, 0.2, 0.1
 """m/s, and share of the speed, beyond which measured friction falls, and the share of the weight that may slide faster:
 friction that is a fifth too large makes 2 % of all forces then."""
-LENGTH, LAG = 0.3, 0.02
+RELAXATION_LENGTH, LARGEST_SLIP_LEAD = 0.3, 0.02
 """m that a carcass takes to follow a slip angle, and rad by which the angle may be ahead of it."""
-TRAVEL = 0.12
+LARGEST_TRAVEL = 0.12
 """m: a car's wheels meet their stops about there."""
 LARGEST_STEER = 0.7
 """rad: beyond, joints of a steering end, and the inner wheel must turn more than the outer one."""
@@ -34,18 +34,18 @@ def assumptions(handling: Handling) -> list[Assumption]:
             "wheel loads",
             "cornering stiffness grows with a tyre's load",
             "drive more slowly or steer less: no tyre here levels off",
-            lambda run: _by_tyre(run["load"] / _static(handling), handling),
+            lambda run: _watched_by_tyre(run["load"] / _static_loads(handling), handling),
             "of the load at rest",
-            most=LOADED,
+            upper_limit=LARGEST_LOAD_RATIO,
         ),
         Assumption(
             "small lean",
             "springs stay upright on a car that leans little",
             "drive more slowly or steer less: no suspension here has a geometry",
-            lambda run: _lean(run, handling),
+            lambda run: _lean_angles(run, handling),
             "rad",
-            -LEAN,
-            LEAN,
+            -LARGEST_LEAN,
+            LARGEST_LEAN,
         ),
         Assumption(
             "one friction",
@@ -53,35 +53,35 @@ def assumptions(handling: Handling) -> list[Assumption]:
             'brake less, or use system = "braking", whose tyre tables know locked wheels',
             lambda run: {"all tyres": _sliding_share(run, handling)},
             "of the weight",
-            most=SLIDES,
+            upper_limit=SLIDING_WEIGHT_SHARE,
         ),
         Assumption(
             "moving tyres",
             "wheels move faster than the speed below which their bristles creep",
             "end the manoeuvre before the car stops: shorten its duration",
-            lambda run: _by_tyre(_contact_speed(run), handling),
+            lambda run: _watched_by_tyre(_contact_speed(run), handling),
             "m/s",
-            least=FADING_SPEED,
+            lower_limit=FADING_SPEED,
         ),
         Assumption(
             "slow steering",
             "tyres build up their forces at once",
-            f"steer more slowly, or drive faster: the lag of {LENGTH:g} m of way is not modelled",
-            lambda run: _by_tyre(_carcass_lag(run), handling),
+            f"steer more slowly, or drive faster: the lag of {RELAXATION_LENGTH:g} m of way is not modelled",
+            lambda run: _watched_by_tyre(_carcass_lag(run), handling),
             "rad",
-            -LAG,
-            LAG,
+            -LARGEST_SLIP_LEAD,
+            LARGEST_SLIP_LEAD,
         ),
         Assumption(
             "steer angle",
             "both front wheels steer by the same angle, and their joints allow it",
             f"steer by at most {LARGEST_STEER:g} rad in manoeuvres.NAME.steer",
-            lambda run: _by_tyre(run["steer"], handling),
+            lambda run: _watched_by_tyre(run["steer"], handling),
             "rad",
             -LARGEST_STEER,
             LARGEST_STEER,
         ),
-        *_travels(handling),
+        *_travel_assumptions(handling),
         *_unbuilt_stops(handling),
     ]
 
@@ -94,7 +94,7 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
             f"stops {body} {freedom}",
             f"{body!r} stays between the stops of its degree of freedom {freedom}, which are not built",
             "drive more slowly or steer less, or stiffen the spring",
-            partial(_coordinate, places.index((body, freedom)), f"{body} {freedom}"),
+            partial(_watched_coordinate, places.index((body, freedom)), f"{body} {freedom}"),
             "rad" if freedom.startswith("r") else "m",
             low,
             high,
@@ -103,7 +103,7 @@ def _unbuilt_stops(handling: Handling) -> list[Assumption]:
     ]
 
 
-def _travels(handling: Handling) -> list[Assumption]:
+def _travel_assumptions(handling: Handling) -> list[Assumption]:
     """Assumptions on springs that alone carry a wheel: travel stays within the spring's curve or, without one, within
     the usual stops of a car.
     """
@@ -115,7 +115,7 @@ def _travels(handling: Handling) -> list[Assumption]:
         if not upright or (spring.second_body, "z") not in handling.vehicle.coordinates():
             continue
         column = handling.vehicle.coordinates().index((str(spring.second_body), "z"))
-        low, high = -TRAVEL, TRAVEL
+        low, high = -LARGEST_TRAVEL, LARGEST_TRAVEL
         remedy = "drive more slowly, or give the spring a travel_force with its stops in the vehicle file"
         if curve := spring.travel_force:
             low, high, remedy = curve.arguments[0], curve.arguments[-1], "let its travel_force reach farther"
@@ -124,7 +124,7 @@ def _travels(handling: Handling) -> list[Assumption]:
                 f"travel {spring.name}",
                 f"the spring {spring.name!r} moves within its travel",
                 remedy,
-                partial(_coordinate, column, spring.name),
+                partial(_watched_coordinate, column, spring.name),
                 "m",
                 low,
                 high,
@@ -133,19 +133,19 @@ def _travels(handling: Handling) -> list[Assumption]:
     return listed
 
 
-def _coordinate(column: int, name: str, run: Result) -> Watched:
+def _watched_coordinate(column: int, name: str, run: Result) -> Watched:
     return {name: run["positions"][:, column]}
 
 
-def _by_tyre(values: np.ndarray, handling: Handling) -> Watched:
+def _watched_by_tyre(values: np.ndarray, handling: Handling) -> Watched:
     return {tyre.name: column for tyre, column in zip(handling.vehicle.tyres, values.T, strict=True)}
 
 
-def _static(handling: Handling) -> np.ndarray:
+def _static_loads(handling: Handling) -> np.ndarray:
     return np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
 
 
-def _lean(run: Result, handling: Handling) -> Watched:
+def _lean_angles(run: Result, handling: Handling) -> Watched:
     places = handling.vehicle.coordinates()
     names = {SWAY: "", **{hitch_of(name): f" of {name} beside what tows it" for name in handling.vehicle.towed}}
     turns = [("roll", "rx"), ("pitch", "ry")]
@@ -154,10 +154,10 @@ def _lean(run: Result, handling: Handling) -> Watched:
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
-    """Share of the vehicle's weight that is carried by tyres which slide faster than SLIDING and than SLIP of their
-    speed.
+    """Share of the vehicle's weight that is carried by tyres which slide faster than SLIDING_SPEED and than
+    SLIDING_SPEED_SHARE of their speed.
     """
-    fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING, SLIP * _contact_speed(run))
+    fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING_SPEED, SLIDING_SPEED_SHARE * _contact_speed(run))
     weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
     return np.sum(run["load"] * fast, axis=1) / weight
 
@@ -169,4 +169,6 @@ def _contact_speed(run: Result) -> np.ndarray:
 
 def _carcass_lag(run: Result) -> np.ndarray:
     """Change of the steer angle (rad) while a wheel covers the distance over which its carcass follows."""
-    return np.gradient(run["steer"], run.times, axis=0) * LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)
+    return (
+        np.gradient(run["steer"], run.times, axis=0) * RELAXATION_LENGTH / np.maximum(_contact_speed(run), FADING_SPEED)
+    )

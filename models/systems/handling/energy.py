@@ -8,7 +8,7 @@ from models.multibody.numbers import Handling
 from models.systems.handling.run import Drive, joint_travel
 
 
-def energy(drive: Drive) -> np.ndarray:
+def drive_energy(drive: Drive) -> np.ndarray:
     """Energy (m,) of a drive in J: kinetic energy from the rigid bodies' own velocities, and potential energy of
     weights, springs and tyres.
     """
@@ -23,7 +23,7 @@ def unaccounted(drive: Drive) -> np.ndarray:
 
     Rows lie at every second step: the middle one of three belongs to the rule.
     """
-    power, times, whole = drive.power(), drive.run.times, energy(drive)[::2]
+    power, times, whole = drive.power(), drive.run.times, drive_energy(drive)[::2]
     work = np.cumsum((times[1] - times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
     return whole[1:] - whole[0] - work
 

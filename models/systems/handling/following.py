@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.measured.drive import MeasuredDrive
 from models.multibody.numbers import Control, Controls, Handling
 from models.systems.handling.run import drive_run
 
 ENGINE = "mujoco"
-CLOSE = 0.002
+SPEED_TOLERANCE = 0.002
 """Rms error of the speed by its mean, with which torques will do."""
-MARCHES = 8
+MOST_MARCHES = 8
 LOW_PASS = 2.0
 """Hz: torques follow no faster change of the speed, which would be the sensor's noise."""
 
@@ -31,15 +31,15 @@ def controls_along(handling: Handling, drive: MeasuredDrive, step: float, file: 
     """
     period = float(drive.times[1] - drive.times[0])
     every = round(period / step)
-    speed = smoothed(drive.speed[:, None], period, LOW_PASS, file, "manoeuvres.NAME.measured")[:, 0]
+    speed = low_passed(drive.speed[:, None], period, LOW_PASS, file, "manoeuvres.NAME.measured")[:, 0]
     mass, radius = sum(body.mass for body in handling.vehicle.bodies), handling.vehicle.tyres[0].point[2]
     force, resistance = mass * np.gradient(speed, period), 0.0
-    for march in range(MARCHES):
+    for march in range(MOST_MARCHES):
         controls = _with_torque(handling.controls, drive, radius * force)
         run = drive_run(ENGINE, handling.changed(controls=controls), float(speed[0]), period * (len(speed) - 1), step)
         reached = run.velocity()[::every, 0]
         missing = speed - reached
-        if np.sqrt(np.mean(missing**2)) <= CLOSE * speed.mean():
+        if np.sqrt(np.mean(missing**2)) <= SPEED_TOLERANCE * speed.mean():
             return controls
         if march == 0:
             lost = force - mass * np.gradient(reached, period)

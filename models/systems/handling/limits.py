@@ -15,16 +15,16 @@ from models.vehicles.spatial import Freedom, hitch_of
 if TYPE_CHECKING:
     from models.systems.handling.run import Drive
 
-LIMIT = 2.78
+STABILITY_LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
-UPRIGHT, FOLDED = 0.5, 1.57
+TURNOVER_ANGLE, JACKKNIFE_ANGLE = 0.5, 1.57
 """Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane; and
 yaw (rad) of a towed body beside what tows it, beyond which a train jackknifes."""
 
 
 def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
     """Refuse a run in which the car turns over or the train jackknifes, as the model is invalid from then on."""
-    for body, freedoms, most, what in _bounds(h):
+    for body, freedoms, most, what in _rotation_bounds(h):
         columns = [
             i for i, (name, freedom) in enumerate(h.vehicle.coordinates()) if name == body and freedom in freedoms
         ]
@@ -33,15 +33,25 @@ def check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine:
             raise RunFailed(engine, f"{what}; drive more slowly or steer less", float(times[np.argmax(over)]))
 
 
-def _bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
+def _rotation_bounds(h: Handling) -> Iterator[tuple[str, tuple[Freedom, ...], float, str]]:
     """Limits of the bodies' rotations: the body, its rotational freedoms, the largest angle (rad), and what exceeding
     it means.
     """
-    yield SWAY, ("rx", "ry"), UPRIGHT, f"the car turns over: it leans by more than {UPRIGHT} rad"
+    yield SWAY, ("rx", "ry"), TURNOVER_ANGLE, f"the car turns over: it leans by more than {TURNOVER_ANGLE} rad"
     for name in h.vehicle.towed:
         beside = f"by more than {{}} rad beside what tows it: {name!r}"
-        yield hitch_of(name), ("rx", "ry"), UPRIGHT, f"a trailer turns over: it leans {beside.format(UPRIGHT)}"
-        yield hitch_of(name), ("rz",), FOLDED, f"the train jackknifes: a trailer turns {beside.format(FOLDED)}"
+        yield (
+            hitch_of(name),
+            ("rx", "ry"),
+            TURNOVER_ANGLE,
+            f"a trailer turns over: it leans {beside.format(TURNOVER_ANGLE)}",
+        )
+        yield (
+            hitch_of(name),
+            ("rz",),
+            JACKKNIFE_ANGLE,
+            f"the train jackknifes: a trailer turns {beside.format(JACKKNIFE_ANGLE)}",
+        )
 
 
 def check_step(drive: "Drive", engine: str) -> None:
@@ -58,12 +68,12 @@ def check_step(drive: "Drive", engine: str) -> None:
             lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
         holds = force[:, i] < 0.95 * n[at.GRIP] * load
         damped = holds * stiffness * lightness / np.maximum(np.abs(tread), FADING_SPEED)
-        if step * damped.max() > LIMIT:
-            row = int(np.argmax(step * damped > LIMIT))
+        if step * damped.max() > STABILITY_LIMIT:
+            row = int(np.argmax(step * damped > STABILITY_LIMIT))
             raise RunFailed(
                 engine,
                 f"tyre {tyre.name!r}, at {tread[row]:.3g} m/s, damps its wheel faster than "
-                f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
+                f"steps of {step:g} s can follow; use at most {0.9 * STABILITY_LIMIT / damped.max():.2g} s, "
                 "or end the run before",
                 float(times[row]),
             )

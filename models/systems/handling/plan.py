@@ -2,13 +2,13 @@
 
 from models.core.assumptions import assumption_lines
 from models.core.finding import Finding
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES, native_share
 from models.engines.towed_springs import divided
 from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
-from models.systems.handling.scene import LIMITS, HandlingScene
+from models.systems.handling.scene import CONTROL_LIMITS, HandlingScene
 from models.vehicles.plausible import plausible
 from models.vehicles.towing import hitch_line
 
@@ -45,7 +45,7 @@ def describe(scene: HandlingScene) -> str:
             "rough, else flat",
         ),
         *(_line("read", note) for note in first.given.notes),
-        *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
+        *(_line(name, _manoeuvre_text(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
         *(_line(*line) for line in plan_lines(scene.engines, scene.run.step)),
         *(_line(*line) for line in _native_shares(first)),
@@ -71,11 +71,11 @@ def _native_shares(handling: Handling) -> list[tuple[str, str]]:
     return [*native_share(handling.vehicle, native), *reasons]
 
 
-def _manoeuvre(scene: HandlingScene, name: str) -> str:
+def _manoeuvre_text(scene: HandlingScene, name: str) -> str:
     manoeuvre = scene.manoeuvres[name]
     if manoeuvre.measured:
         return f"{manoeuvre.duration:g} s along the measured steer angle and speed of {manoeuvre.measured}"
-    acts = [control for control in LIMITS if any(value for _, value in getattr(manoeuvre, control))]
+    acts = [control for control in CONTROL_LIMITS if any(value for _, value in getattr(manoeuvre, control))]
     return f"{manoeuvre.speed:g} m/s, {manoeuvre.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
 
 

@@ -17,8 +17,8 @@ from models.core.discretisation import (
     by_steps,
     not_estimated,
     size_of,
-    stated,
     summed_error,
+    with_stated_errors,
 )
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
@@ -43,19 +43,19 @@ if TYPE_CHECKING:
 
 REFERENCE = "reference"
 """The independent reference: plain equations that share no force with the engines; half a minute for every second."""
-ORDER, NET_ORDER = 3.0, 2.0
+TOLD_ORDERS, NET_ORDER = 3.0, 2.0
 """Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
-UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
+UNIT_OF_CHANNEL = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
 """Channels whose error is told."""
-EVERY = 50
+ROWS_BETWEEN_NETS = 50
 """Rows from one to the next at which creep forces of several nets are compared."""
-MOST_CELLS, CELLS = 200, "tyres.cells"
+MOST_CELLS, CELLS_KEY = 200, "tyres.cells"
 """Most cells per strip, and the key that they are set by."""
-MIDDLE = 0.4
+REPEATED_PART_START = 0.4
 """Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
-STILL = 1e-6
+STANDSTILL_SHARE = 1e-6
 """Share of the load at rest, and of the speed at the start, below which a force or a speed is rounding."""
-REPORTS = {
+TYRE_CHANNELS = {
     "load": (at.PRESS, "N", "of the tyre on the road"),
     "fx": (at.FX, "N", "creep force along the wheel"),
     "fy": (at.FY, "N", "creep force to its left"),
@@ -68,12 +68,12 @@ REPORTS = {
 }
 """Channels of every tyre: column of its report, unit, meaning."""
 
-BELOW = "of the place below the chassis' centre, left positive"
-MOTION = {
+PLACE_BELOW_TEXT = "of the place below the chassis' centre, left positive"
+MOTION_CHANNELS = {
     "forward speed": ("m/s", "of the place below the chassis' centre"),
     "yaw rate": ("rad/s", "left positive"),
-    "lateral acceleration": ("m/s^2", BELOW),
-    "side slip": ("rad", BELOW),
+    "lateral acceleration": ("m/s^2", PLACE_BELOW_TEXT),
+    "side slip": ("rad", PLACE_BELOW_TEXT),
 }
 """Channels of the car, by the names of what is measured of one: unit, meaning."""
 
@@ -91,8 +91,8 @@ class Drive:
     seconds: float = 0.0
 
     def __getitem__(self, channel: str) -> np.ndarray:
-        """A channel (m, w) of REPORTS by its name, with a column for each tyre."""
-        return self.tyres[:, :, REPORTS[channel][0]]
+        """A channel (m, w) of TYRE_CHANNELS by its name, with a column for each tyre."""
+        return self.tyres[:, :, TYRE_CHANNELS[channel][0]]
 
     @property
     def path(self) -> np.ndarray:
@@ -115,9 +115,11 @@ class Drive:
         return np.gradient(aside, self.run.times) + ahead * turning
 
     def motion(self) -> dict[str, np.ndarray]:
-        """The channels (m,) of MOTION by name."""
+        """The channels (m,) of MOTION_CHANNELS by name."""
         ahead, aside, turning = self.velocity().T
-        return dict(zip(MOTION, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True))
+        return dict(
+            zip(MOTION_CHANNELS, (ahead, turning, self.lateral_acceleration(), np.arctan2(aside, ahead)), strict=True)
+        )
 
     def slip_angles(self) -> np.ndarray:
         """Slip angles (m, w) in rad: direction in which each wheel's contact moves relative to the wheel's plane,
@@ -162,8 +164,8 @@ def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
         for key, per in (("positions", ""), ("rates", ", per s"))
     }
-    channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
-    channels |= {name: Channel("time", values, *MOTION[name]) for name, values in drive.motion().items()}
+    channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in TYRE_CHANNELS.items()}
+    channels |= {name: Channel("time", values, *MOTION_CHANNELS[name]) for name, values in drive.motion().items()}
     axes = {
         "time": Channel("time", scene.begins(manoeuvre) + drive.run.times, "s"),
         "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
@@ -180,17 +182,17 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     """The result with errors of its motion and of its tyres' forces, estimated by longer steps and by other grids of
     the patch.
     """
-    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal(drive)
-    still = {"N": STILL * max(drive.handling.held.tyres.values())}
+    rerun, fine = ManoeuvreRerun(run.data.attrs["engine"], drive, speed), principal_series(drive)
+    still = {"N": STANDSTILL_SHARE * max(drive.handling.held.tyres.values())}
     moving = {
         name: values
         for name, values in fine.channels.items()
-        if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
+        if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, how = by_steps(Series(fine.times, moving), rerun, ORDER, rerun.step)
+    by_step, how = by_steps(Series(fine.times, moving), rerun, TOLD_ORDERS, rerun.step)
     by_net = rerun.by_cells(list(moving))
-    told = {name: replace(summed_error(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
-    return stated(run, told, f"{how}, and other nets of the patch")
+    told = {name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving}
+    return with_stated_errors(run, told, f"{how}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +219,7 @@ class ManoeuvreRerun:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
         step = factor * self.step
-        return principal(drive_run(self.engine, changed, self.speed, steps * step, step))
+        return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
     def __call__(self, factor: float, share: float) -> Series:
         """Run the manoeuvre again in twice the step, or its second half in half the step (see
@@ -227,11 +229,14 @@ class ManoeuvreRerun:
         if factor > 1.0:
             return self.in_double_step
         run, handling, step = self.drive.run, self.drive.handling, factor * self.step
-        first, count = round(MIDDLE * (len(run.times) - 1)), max(2, round(share * (len(run.times) - 1) / factor))
-        later = _later(handling, run.times[first])
+        first, count = (
+            round(REPEATED_PART_START * (len(run.times) - 1)),
+            max(2, round(share * (len(run.times) - 1) / factor)),
+        )
+        later = _manoeuvre_from(handling, run.times[first])
         model = build(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])
-        return principal(read_run(later, path, self.engine), run.times[first])
+        return principal_series(read_run(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
         """Errors of the patch's grid, estimated by a run in the same steps with a third of its cells.
@@ -244,36 +249,38 @@ class ManoeuvreRerun:
         try:
             base, coarse = self.in_double_step, self._with_net(other, 2.0)
         except RunFailed:
-            base, coarse = principal(self.drive), self._with_net(other, 1.0)
-        creepages, fewer, more = (self._creep(count) for count in (cells, other, finer))
+            base, coarse = principal_series(self.drive), self._with_net(other, 1.0)
+        creepages, fewer, more = (self._creep_forces(count) for count in (cells, other, finer))
         apart, error = np.linalg.norm(creepages - fewer), np.linalg.norm(creepages - more) / (1.0 - 0.5**NET_ORDER)
         share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            net = by_cells(gap, size_of(values), UNITS[name], cells, NET_ORDER, MOST_CELLS)
-            told[name] = replace(net, of=CELLS)
+            net = by_cells(gap, size_of(values), UNIT_OF_CHANNEL[name], cells, NET_ORDER, MOST_CELLS)
+            told[name] = replace(net, of=CELLS_KEY)
         return told
 
-    def _creep(self, cells: int) -> np.ndarray:
+    def _creep_forces(self, cells: int) -> np.ndarray:
         """Creep forces (m, w, 2) in N at some states of the drive, computed on a grid of ``cells``."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
         times, positions, rates = (
-            np.ascontiguousarray(each[::EVERY]) for each in (run.times, run.positions, run.rates)
+            np.ascontiguousarray(each[::ROWS_BETWEEN_NETS]) for each in (run.times, run.positions, run.rates)
         )
         report = np.empty((len(times), len(handling.vehicle.tyres), at.REPORTED))
         at.reports(numbers, times, positions, rates, report, np.empty((len(times), at.LEDGER)))
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal(drive: Drive, start_time: float = 0.0) -> Series:
+def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
     """Channels whose error is estimated, over the time of a drive that begins at ``start_time`` (s)."""
-    motion = dict(zip(UNITS, drive.velocity().T, strict=False))
-    return Series(start_time + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
+    motion = dict(zip(UNIT_OF_CHANNEL, drive.velocity().T, strict=False))
+    return Series(
+        start_time + drive.run.times, motion | {name: drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS}
+    )
 
 
-def _later(handling: Handling, start_time: float) -> Handling:
+def _manoeuvre_from(handling: Handling, start_time: float) -> Handling:
     """The same manoeuvre with time counted from ``start_time`` (s)."""
 
     def moved(control: Control) -> Control:
@@ -294,13 +301,13 @@ def _later(handling: Handling, start_time: float) -> Handling:
 def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : needed for runs."""
     if engine == REFERENCE:
-        return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
+        return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
     division, whole = divided(handling, engine), driven_by(handling)
     parts = (*whole.parts, *division.native)
     return free_model(engine, replace(whole, numbers=numbers_beside(handling, division), parts=parts), settings)
 
 
-def _plain(handling: Handling) -> "PlainRolling":
+def _plain_equations(handling: Handling) -> "PlainRolling":
     from models.multibody.plain.rolling import PlainRolling
 
     return PlainRolling(handling)
@@ -330,7 +337,7 @@ def driven_adaptively(engine: str, handling: Handling, speed: float, settings: S
     model, begun = build(engine, handling), time.process_time()
     with _turning_over(handling, engine):
         path = march_adaptively(model, *handling.straight(speed), settings)
-    return reported(handling, path, engine, time.process_time() - begun)
+    return drive_with_reports(handling, path, engine, time.process_time() - begun)
 
 
 @contextmanager
@@ -347,32 +354,32 @@ def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
 
 
 def read_run(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """The drive from a run in fixed steps, as from ``reported``; RunFailed where the steps are too long for the
-    motion.
+    """The drive from a run in fixed steps, as from ``drive_with_reports``; RunFailed where the steps are too long for
+    the motion.
     """
-    drive = reported(handling, run, engine, seconds)
+    drive = drive_with_reports(handling, run, engine, seconds)
     check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return drive
 
 
-def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+def drive_with_reports(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
     """The drive from a run, with the reports of its tyres; RunFailed where a tyre's force is not finite, or the car
     turns over.
     """
-    report, ledger = _reports(handling, run, engine)
+    report, ledger = _reports_of_run(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     check_upright(handling, run.times, run.positions, engine)
     return Drive(handling, run, report, ledger, seconds)
 
 
-def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
+def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
     """Reports of the tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; for the reference they come from its own
     equations.
     """
     if engine == REFERENCE:
-        return _plain(handling).report(run.times, run.positions, run.rates)
+        return _plain_equations(handling).report(run.times, run.positions, run.rates)
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended, with_own
+from models.core.scene_effects import extended_by_effects, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
-from models.core.strict import Query, Strict, accepted, quantity
+from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import Adaptive, check_engines
 from models.multibody.numbers import Controls, Handling, Tyres
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
 AT_REST = [[0.0, 0.0]]
-LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0, 1e5, "N m")}
+CONTROL_LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0, 1e5, "N m")}
 """What values of each control may be."""
 
 
@@ -37,7 +37,7 @@ class HandlingVehicle(Strict):
     file: str = Field(
         default="r19_free", description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF"
     )
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class TyreTable(Strict):
@@ -101,7 +101,7 @@ class Manoeuvre(Strict):
     def controls(self) -> Controls:
         """Steering, brakes and drive of the driver over time."""
         steer, brake, drive = (
-            tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
+            tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in CONTROL_LIMITS
         )
         return Controls(steer, brake, drive, self.front_brake, self.front_drive)
 
@@ -145,7 +145,9 @@ class HandlingScene(SceneFile):
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
         tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
-        return extended(Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self)
+        return extended_by_effects(
+            Handling(self.given(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
+        )
 
     def drive(self, name: str) -> "MeasuredDrive":
         """The measured drive of a manoeuvre, cut to the manoeuvre's duration; InputError for a file that holds none."""
@@ -183,7 +185,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
     for name, manoeuvre in scene.manoeuvres.items():
         place = f"manoeuvres.{name}"
         _check_times(scene, place, manoeuvre)
-        for control, limits in LIMITS.items():
+        for control, limits in CONTROL_LIMITS.items():
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
     check_engines(scene.file, scene.engines)
     return with_own(scene)
@@ -194,7 +196,7 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
     filled = dict[str, Manoeuvre]()
     for name, manoeuvre in scene.manoeuvres.items():
         if manoeuvre.measured:
-            filled[name] = _measured(scene, name, manoeuvre)
+            filled[name] = _measured_manoeuvre(scene, name, manoeuvre)
         elif manoeuvre.speed > 0.0:
             filled[name] = manoeuvre
         else:
@@ -202,10 +204,10 @@ def _with_measured(scene: HandlingScene) -> HandlingScene:
     return scene.model_copy(update={"manoeuvres": filled})
 
 
-def _measured(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
+def _measured_manoeuvre(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -> Manoeuvre:
     """A manoeuvre with the speed and duration of its measured drive; refuses keys that contradict the measured file."""
     file, place, drive = scene.file, f"manoeuvres.{name}", scene.drive(name)
-    for control in LIMITS:
+    for control in CONTROL_LIMITS:
         if getattr(manoeuvre, control) != AT_REST:
             raise InputError(file, f"{place}.{control}", None, "cannot go with a measured drive, which has its own")
     period = float(drive.times[1] - drive.times[0])

@@ -25,13 +25,13 @@ class SteadyTurn:
     """Steady turn per rad of steer: yaw rate (rad/s), and lateral velocity (m/s) at the common centre of mass.
 
     ``understeer`` is the gradient K (s^2/m) of delta = (L + K u^2) r / u, L the wheelbase of the towing vehicle;
-    ``headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
+    ``towed_headings`` : of the towed bodies to the left of it, in the order of ``towed``, per rad of steer.
     """
 
     yaw_gain: float
     side_gain: float
     understeer: float
-    headings: tuple[float, ...] = ()
+    towed_headings: tuple[float, ...] = ()
 
 
 def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
@@ -42,7 +42,7 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     size = 2 + len(free.towed)
     matrix, steered = np.zeros((size, size)), np.zeros(size)
     for body in free.bodies:
-        by_force, _ = _balances(free, body.name, body.position[0], centre)
+        by_force, _ = _force_balances(free, body.name, body.position[0], centre)
         matrix[:, 1] -= body.mass * speed * by_force
     for i, tyre in enumerate(free.tyres):
         n = handling.tyre_numbers(i)
@@ -52,7 +52,7 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
         heading = [-float(name == free.towed_under(tyre.body)) for name in free.towed]
         slip = np.array([1.0 / speed, (tyre.point[0] - centre) / speed, *heading])
         turn = np.eye(size)[1] / speed
-        by_force, by_moment = _balances(free, tyre.body, tyre.point[0], centre)
+        by_force, by_moment = _force_balances(free, tyre.body, tyre.point[0], centre)
         matrix += c * np.outer(by_moment, trail * slip - turning * turn) - c * np.outer(by_force, slip + trail * turn)
         steered += n[STEERED] * c * (trail * by_moment - by_force)
     side, yaw, *headings = np.linalg.solve(matrix, steered).tolist()
@@ -61,7 +61,7 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     return SteadyTurn(yaw, side, float((speed / yaw - wheelbase) / speed**2), tuple(headings))
 
 
-def _balances(free: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
+def _force_balances(free: SpatialVehicle, body: str, x: float, centre: float) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (2 + towed,) with which a side force on a body at x (m), and a moment about the vertical, enter the
     equilibrium: of side forces, of moments about the centre, and of moments about the hitch of each towed body.
     """

@@ -8,27 +8,29 @@ from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.engines.cut_vehicle import UPRIGHT
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import Angles, travels
+from models.systems.hub_forces.measurement import Angles, element_travels
 from models.systems.hub_forces.scene import HubScene, Road
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
-_SMOOTHER = "take a smoother road.iso8608, a lower road.speed, stiffer springs, or give them a stop as travel_force"
+_SMOOTHER_ROAD_ADVICE = (
+    "take a smoother road.iso8608, a lower road.speed, stiffer springs, or give them a stop as travel_force"
+)
 ON_TYRES = "on tyres"
 """In place of a method: the run on the road that gives a virtual measurement."""
-PUSHES = 1.0
+PULL_LIMIT = 1.0
 """N: a tyre that pulls by less is at its edge."""
-GRIPS = 0.45
+LARGEST_SIDE_FORCE_SHARE = 0.45
 """Of a tyre's load at rest: up to half of a friction of 0.9 side forces grow with the slip angle."""
-SMALL = 0.2
+SMALL_ANGLE = 0.2
 """rad: turns about the body's axes are angles to 2 %, and a heading leaves the road's tracks to 2 %."""
-TURNED = 0.05
+TURNED_FORCE_ANGLE = 0.05
 """rad that turn 5 % of a force into another axis."""
-TRAVEL, TURN = 0.12, 0.3
+LARGEST_TRAVEL, LARGEST_JOINT_TURN = 0.12, 0.3
 """m and rad: a car's springs meet their stops about there; no stop is in a linear spring or bar."""
-SAMPLED = {"held": 0.064, "linear": 0.25, "smooth": 0.4}
+WAVE_SHARE_OF_RULE = {"held": 0.064, "linear": 0.25, "smooth": 0.4}
 """Waves of the road by samples: held samples are half a period late, 20 % of such a wave; between samples on straight
 lines 19 % of it are lost, on cubics 20 %."""
-BALANCE, RISING = 0.05, 0.5
+LARGEST_IMBALANCE, ROUGH_ROAD_SPEED_CHANGE = 0.05, 0.5
 """Of the weight: forces that are out of balance by so much lift or drop a vehicle by 55 m in 15 s; and the change of
 vertical speed (m/s) that a rough road may leave between the ends of a run."""
 
@@ -39,14 +41,17 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
     angles : measured angles that the run is compared with; None to list the assumptions only.
     """
     listed = _on_tyres(vehicle) if method == ON_TYRES else _on_forces(scene, vehicle, method, angles)
-    return [*listed, *inside(vehicle, lambda run: travels(vehicle, run.detail), _SMOOTHER)]
+    return [
+        *listed,
+        *usual_travel_assumptions(vehicle, lambda run: element_travels(vehicle, run.detail), _SMOOTHER_ROAD_ADVICE),
+    ]
 
 
-def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
+def usual_travel_assumptions(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
     """Assumptions that springs, mounts and bars without stops keep within usual travels. ``travel`` gives the travels
     (m, rad) by name; a travel_force counts as a stop.
     """
-    kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
+    kinds = (("springs", "N", "m", LARGEST_TRAVEL), ("bars", "N m", "rad", LARGEST_JOINT_TURN))
     listed = []
     for kind, of, unit, most in kinds:
         names = {each.name for each in vehicle.elements if each.unit == of and not each.travel_force}
@@ -62,17 +67,17 @@ def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str
 def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
     """Assumptions of a vehicle on linear tyres that run along two tracks."""
     return [
-        *_pressing(vehicle, PUSHES),
+        *_pressing_assumptions(vehicle, PULL_LIMIT),
         Assumption(
             "side forces",
             "side forces of the measurement grow with the slip angle",
             'use system = "handling", whose tyres slide, or lower road.speed',
             lambda run: {
                 hub: np.abs(force) / load
-                for (hub, force), load in zip(_at_hubs(run, vehicle, 1).items(), vehicle.loads, strict=True)
+                for (hub, force), load in zip(_forces_at_hubs(run, vehicle, 1).items(), vehicle.loads, strict=True)
             },
             "of the load at rest",
-            most=GRIPS,
+            upper_limit=LARGEST_SIDE_FORCE_SHARE,
         ),
         Assumption(
             "straight on",
@@ -80,13 +85,13 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
             'use system = "handling", or a smoother road',
             lambda run: {name: run[name] for name in ("roll", "pitch", "heading")},
             "rad",
-            -SMALL,
-            SMALL,
+            -SMALL_ANGLE,
+            SMALL_ANGLE,
         ),
     ]
 
 
-def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
+def _pressing_assumptions(vehicle: CutVehicle, pull: float) -> list[Assumption]:
     """Assumption that linear tyres never pull at the road by more than ``pull`` (N); none for tyres that can only
     push.
     """
@@ -94,9 +99,9 @@ def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
         "tyres press",
         "the linear tyres of the measurement stay on the road",
         "name the effect lift_off, whose tyres only push",
-        lambda run: _at_hubs(run, vehicle, 2),
+        lambda run: _forces_at_hubs(run, vehicle, 2),
         "N",
-        least=-pull,
+        lower_limit=-pull,
     )
     return [] if vehicle.uncut.lifts else [lifting]
 
@@ -122,8 +127,8 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
                 "name the effect kalman_filter or prescribed_angles",
                 lambda run: _angle_differences(run, angles),
                 "rad",
-                -TURNED,
-                TURNED,
+                -TURNED_FORCE_ANGLE,
+                TURNED_FORCE_ANGLE,
             )
         )
     if method == "kalman":
@@ -134,17 +139,17 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
                 "name the effect prescribed_angles in place of kalman_filter",
                 lambda run: {name: run[name] for name in ("roll", "pitch")},
                 "rad",
-                -SMALL,
-                SMALL,
+                -SMALL_ANGLE,
+                SMALL_ANGLE,
             )
         )
     if scene.road is None:
-        return [*listed, _balanced(vehicle)]
+        return [*listed, _balance_assumption(vehicle)]
     noise = 5.0 * scene.forces.force_deviation if scene.forces.noise == "white" else 0.0
-    return [*listed, _sampled(scene, scene.road), *_pressing(vehicle, PUSHES + noise)]
+    return [*listed, _sampling_assumption(scene, scene.road), *_pressing_assumptions(vehicle, PULL_LIMIT + noise)]
 
 
-def _balanced(vehicle: CutVehicle) -> Assumption:
+def _balance_assumption(vehicle: CutVehicle) -> Assumption:
     """Assumption that the measured vertical forces carry the vehicle's weight on average."""
     return Assumption(
         "balance",
@@ -152,12 +157,12 @@ def _balanced(vehicle: CutVehicle) -> Assumption:
         "correct the loads of the vehicle file, or the columns of forces.file",
         lambda run: {
             "all hubs": carried_weight_share(
-                sum(_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1]
+                sum(_forces_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1]
             )
         },
         "of the weight",
-        1.0 - BALANCE,
-        1.0 + BALANCE,
+        1.0 - LARGEST_IMBALANCE,
+        1.0 + LARGEST_IMBALANCE,
     )
 
 
@@ -166,10 +171,10 @@ def carried_weight_share(forces: np.ndarray, vehicle: CutVehicle, duration: floa
     of the vertical speed could explain.
     """
     excess = forces.mean() / vehicle.loads.sum() - 1.0
-    return np.array([1.0 + np.sign(excess) * max(abs(excess) - RISING / (GRAVITY * duration), 0.0)])
+    return np.array([1.0 + np.sign(excess) * max(abs(excess) - ROUGH_ROAD_SPEED_CHANGE / (GRAVITY * duration), 0.0)])
 
 
-def _sampled(scene: HubScene, road: Road) -> Assumption:
+def _sampling_assumption(scene: HubScene, road: Road) -> Assumption:
     """Assumption that a virtual measurement samples fast enough for the shortest wave of the road."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
@@ -180,7 +185,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
         f"raise forces.sampling_rate,{other} or lower road.speed",
         lambda run: {"shortest wave": np.array([road.speed / wave / rate])},
         "waves per sample",
-        most=SAMPLED[rule],
+        upper_limit=WAVE_SHARE_OF_RULE[rule],
     )
 
 
@@ -193,6 +198,6 @@ def _angle_differences(run: Result, angles: Angles | None) -> Watched:
     }
 
 
-def _at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
+def _forces_at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
     """Applied forces (n,), N, along one axis, by the name of the hub."""
     return {hub: run.detail.wrenches[:, i, axis] for i, hub in enumerate(vehicle.hubs)}

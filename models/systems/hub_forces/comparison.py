@@ -6,19 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import stated
+from models.core.discretisation import with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.fatigue.damage import damage_ratio
-from models.systems.hub_forces.run import MOTION, Measurement, labelled, measure
+from models.systems.hub_forces.run import MOTION_CHANNELS, Measurement, labelled_result, measure
 from models.systems.hub_forces.run import run as run_scene
 from models.systems.hub_forces.scene import HubScene, Method
 
 Progress = Callable[[str, float], None]
-FREE, FILTER, PRESCRIBED = "free", "filter", "prescribed"
-METHODS: dict[str, Method] = {FREE: "none", FILTER: "kalman", PRESCRIBED: "prescribed"}
+FREE_RUN, FILTERED_RUN, PRESCRIBED_RUN = "free", "filter", "prescribed"
+METHOD_OF_RUN: dict[str, Method] = {FREE_RUN: "none", FILTERED_RUN: "kalman", PRESCRIBED_RUN: "prescribed"}
 """Runs that are compared, whatever the scene's own method, and how roll and pitch are held in them."""
-DRIFTED = 0.05
+DRIFT_OFF_ANGLE = 0.05
 """rad: a roll or pitch that is off by more is drift-off, as in the study of the pitch plane."""
 
 
@@ -47,8 +47,8 @@ class Comparison:
         Without a true run, errors of roll and pitch are relative to the filter's estimate, and the others NaN.
         """
         if self.truth is not None:
-            return np.column_stack([run[name] - self.truth[name] for name in MOTION])
-        tilt, off = self.measurement.tilt, np.full((len(run.times), len(MOTION)), np.nan)
+            return np.column_stack([run[name] - self.truth[name] for name in MOTION_CHANNELS])
+        tilt, off = self.measurement.tilt, np.full((len(run.times), len(MOTION_CHANNELS)), np.nan)
         times = self.measurement.angles.period * np.arange(len(tilt.states))
         for i, name in enumerate(("roll", "pitch")):
             off[:, i] = run[name] - np.interp(run.times, times, tilt.states[:, i])
@@ -58,13 +58,13 @@ class Comparison:
         """Damage of every element from section forces (m, e), divided by that in the true run or, without one, in the
         filter's run.
         """
-        true = (self.truth or self.runs[FILTER])["section_force"]
+        true = (self.truth or self.runs[FILTERED_RUN])["section_force"]
         names = (element.name for element in self.measurement.vehicle.elements)
         return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
 
     def drift_off(self, run: Result) -> float:
-        """First time (s) at which the error of roll or pitch exceeds DRIFTED; infinite if it never does."""
-        off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFTED
+        """First time (s) at which the error of roll or pitch exceeds DRIFT_OFF_ANGLE; infinite if it never does."""
+        off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFT_OFF_ANGLE
         return float(run.times[np.argmax(off)]) if off.any() else float("inf")
 
     def answer(self) -> dict[str, Any]:
@@ -75,7 +75,7 @@ class Comparison:
         out |= {name: {"failed": text} for name, text in self.failed.items()}
         for name, run in self.runs.items():
             out[name] = {
-                **dict(zip(MOTION, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
+                **dict(zip(MOTION_CHANNELS, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
                 "moments": np.sqrt(np.mean(run["holding_moment"] ** 2, axis=0)).tolist(),
                 "damage": self.damages(run["section_force"]),
             }
@@ -85,7 +85,7 @@ class Comparison:
         """Largest difference between engines in any coordinate or rate before drift-off, for the method with the most
         runs.
         """
-        kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHODS]
+        kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHOD_OF_RUN]
         alike = max(kinds, key=len)
         first, times = alike[0].detail.states, alike[0].times
         rows = int(min(min(map(self.drift_off, alike)), times[-1]) / times[1]) + 1
@@ -108,7 +108,7 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
         try:
             runs[name] = run_scene(scene, engine, method, measurement, scene.error)
         except RunFailed as error:
-            if name == FILTER:  # what the others are compared with
+            if name == FILTERED_RUN:  # what the others are compared with
                 raise
             failed[name] = str(error)
     return Comparison(measurement, runs, failed, _true_run(measurement, last))
@@ -118,8 +118,8 @@ def _true_run(measurement: Measurement, engine: str) -> Result | None:
     """The true run of a virtual measurement as a labelled result, with the errors that were estimated for it."""
     if measurement.truth is None:
         return None
-    run = labelled(measurement, measurement.truth, engine)
-    return stated(run, measurement.errors, "runs in longer steps") if measurement.errors else run
+    run = labelled_result(measurement, measurement.truth, engine)
+    return with_stated_errors(run, measurement.errors, "runs in longer steps") if measurement.errors else run
 
 
 def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
@@ -127,8 +127,8 @@ def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[M
     engine.
     """
     return {
-        name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
-        for name, method in METHODS.items()
+        name if name != FREE_RUN and engine == engines[-1] else f"{name}, {engine}": (method, engine)
+        for name, method in METHOD_OF_RUN.items()
         for engine in engines
         if method == scene.stabilise.method or engine == engines[-1]
     }

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.core.noise import FORCES, PITCH_SENSOR, normal
-from models.core.signals import Interpolation, sampled
+from models.core.noise import FORCES, PITCH_SENSOR, normal_samples
+from models.core.signals import Interpolation, signal_from_samples
 from models.engines.cut_vehicle import HubModel, HubRun, build, reported
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs, table
@@ -28,12 +28,12 @@ class HubForces:
 
     def hub_inputs(self, step: float, steps: int, interpolation: Interpolation = "linear") -> HubInputs:
         """Hub forces as a run's inputs, sampled at half steps."""
-        signal = sampled(self.samples, self.period, interpolation)
+        signal = signal_from_samples(self.samples, self.period, interpolation)
         return HubInputs(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame, held=signal.held)
 
     def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
         """The hub forces with white noise of standard deviations (6 h,), N and N m, on every sample."""
-        noise = normal(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
+        noise = normal_samples(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
         return replace(self, samples=self.samples + noise * deviation)
 
 
@@ -48,7 +48,7 @@ class Angles:
 
     def noisy(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
         """The angles with white noise of these standard deviations of angle (rad) and rate (rad/s)."""
-        noise = normal(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
+        noise = normal_samples(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
         return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
 
 
@@ -73,7 +73,7 @@ def true_run(engine: str, vehicle: CutVehicle, road: HubInputs, frame: str, step
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
 
 
-def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
+def element_travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     """Travel (m,) of every spring, mount and bar over a run, by name: from the design position in m, rad of a bar,
     positive in compression.
     """
@@ -84,7 +84,7 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 
-def recorded(run: HubRun, frame: str, stride: int) -> tuple[HubForces, Angles]:
+def recorded_measurement(run: HubRun, frame: str, stride: int) -> tuple[HubForces, Angles]:
     """Hub forces and angles of a run, sampled without noise at every ``stride``-th step."""
     n, period = run.states.shape[1] // 2, float(run.times[1]) * stride
     angles = run.states[::stride, [ROLL, PITCH, n + ROLL, n + PITCH]]
@@ -92,7 +92,7 @@ def recorded(run: HubRun, frame: str, stride: int) -> tuple[HubForces, Angles]:
     return HubForces(wrenches.reshape(len(wrenches), -1), period, frame), Angles(angles, period)
 
 
-def model(
+def hub_model(
     engine: str,
     vehicle: CutVehicle,
     forces: HubForces,

@@ -8,12 +8,12 @@ import numpy as np
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
-from models.core.finding import Finding, gathered
-from models.core.scene_effects import lines as effect_lines
+from models.core.finding import Finding, merged_findings
+from models.core.scene_effects import effect_lines as effect_lines
 from models.engines.cut_vehicle import check_step, native_share
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES as FREE_ENGINES
-from models.measured.signal import UNITS, Quantity, Signal
+from models.measured.signal import UNIT_OF_QUANTITY, Quantity, Signal
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.scene import Frame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid
@@ -22,13 +22,13 @@ from models.vehicles.plausible import plausible
 if TYPE_CHECKING:
     from models.measured.recording import Recording
 
-COMPARING = "hub_forces"
+COMPARING_STUDY = "hub_forces"
 """The study that runs a scene with every stabiliser and without, whichever it names."""
 
 Signals = tuple[tuple[Quantity, str], ...]
-ANGLES: Signals = tuple((what, axis) for what in ("angle", "angular rate") for axis in ("roll", "pitch"))
-WRENCH: Signals = tuple((what, axis) for what in ("force", "moment") for axis in "xyz")
-REMEDY = "Correct the columns of the file, or map them in a scene of the system measured"
+ANGLE_SIGNALS: Signals = tuple((what, axis) for what in ("angle", "angular rate") for axis in ("roll", "pitch"))
+WRENCH_SIGNALS: Signals = tuple((what, axis) for what in ("force", "moment") for axis in "xyz")
+COLUMN_REMEDY = "Correct the columns of the file, or map them in a scene of the system measured"
 """Files of hub forces have no channel map, of which the checks of recordings speak."""
 
 
@@ -70,7 +70,7 @@ def describe(scene: HubScene) -> str:
             f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
         *(_line("read", note) for note in vehicle.uncut.notes),
-        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames(vehicle)}"),
+        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames_text(vehicle)}"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
         _line("noise", _noise(scene)),
     ]
@@ -84,9 +84,9 @@ def describe(scene: HubScene) -> str:
         )
     lines.append(_line("run", f"{scene.run.duration:g} s, Runge-Kutta 4, {scene.run.step:g} s"))
     lines += [_line(*line) for line in plan_lines(scene.engines, scene.run.step)]
-    if scene.study == COMPARING:
+    if scene.study == COMPARING_STUDY:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
-    lines += [_line("doubt", text) for text in doubts(scene)]
+    lines += [_line("doubt", text) for text in filter_objections(scene)]
     lines += _whose_forces(scene, vehicle)
     never = "drag, tyres that roll"
     runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
@@ -94,17 +94,17 @@ def describe(scene: HubScene) -> str:
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _line("never", never)])
 
 
-def doubts(scene: HubScene) -> tuple[str, ...]:
+def filter_objections(scene: HubScene) -> tuple[str, ...]:
     """The Kalman filter's objections to the measured files. A virtual measurement has none yet: it is not made here."""
-    if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING):
+    if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING_STUDY):
         return ()
     from models.systems.hub_forces.run import Measurement
 
     vehicle = scene.cut_vehicle()
-    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.doubts
+    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.objections
 
 
-def _frames(vehicle: CutVehicle) -> str:
+def _frames_text(vehicle: CutVehicle) -> str:
     """Text that names the bodies to which the axes of the elements are fixed."""
     others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
     return "; ".join(["in the chassis' axes", *others])
@@ -143,8 +143,8 @@ def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, .
     from models.measured.checks import check
 
     findings = [
-        replace(each, text=_of_file(each.text))
-        for each in check(_recording(scene, vehicle), vehicle)
+        replace(each, text=_finding_text(each.text))
+        for each in check(_measured_recording(scene, vehicle), vehicle)
         if each.check not in scene.forces.accept
     ]
     if errors := [each for each in findings if each.weight == "error"]:
@@ -153,31 +153,32 @@ def doubts_about_files(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, .
             scene.file,
             "forces.file",
             scene.forces.file,
-            f"{' '.join(each.text for each in gathered(errors))} {REMEDY}; if it is meant so: accept = {names} under "
+            f"{' '.join(each.text for each in merged_findings(errors))} {COLUMN_REMEDY}; if it is "
+            f"meant so: accept = {names} under "
             "[forces].",
         )
     return tuple(each for each in findings if each.weight == "doubt")
 
 
-def _of_file(text: str) -> str:
+def _finding_text(text: str) -> str:
     """Text of a finding without its advice on a channel map, which plain files do not have."""
     before, colon, _ = text.partition("; give sign")
     return before + "." if colon else text.replace(" in the channel map", "")
 
 
-def _recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
+def _measured_recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
     """Both measured files as a recording; the noise of the angles is the one that the scene states."""
     from models.measured.columns import MemoryColumns
     from models.measured.recording import Recording
 
     def signal(location: str, quantity: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
         name = f"{location} {quantity} {axis}"
-        return Signal(name, str(file), name, quantity, location, axis, frame, 1, UNITS[quantity], 1.0)
+        return Signal(name, str(file), name, quantity, location, axis, frame, 1, UNIT_OF_QUANTITY[quantity], 1.0)
 
     (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
     signals = (
-        *(signal(hub, *each, files[0], scene.forces.frame) for hub in vehicle.hubs for each in WRENCH),
-        *(signal(vehicle.chassis, *each, files[1], "body") for each in ANGLES),
+        *(signal(hub, *each, files[0], scene.forces.frame) for hub in vehicle.hubs for each in WRENCH_SIGNALS),
+        *(signal(vehicle.chassis, *each, files[1], "body") for each in ANGLE_SIGNALS),
     )
     count = min(len(forces.samples), len(angles.samples))
     samples = np.hstack([forces.samples[:count], angles.samples[:count]])

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, Series, by_steps, not_estimated, stated, summed_error
+from models.core.discretisation import Estimate, Series, by_steps, not_estimated, summed_error, with_stated_errors
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.core.steps import divides
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import HubModel, HubRun, Route, build
@@ -25,23 +25,27 @@ from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded, two_tracks
+from models.systems.hub_forces.measurement import Angles, HubForces, recorded_measurement, two_tracks
 from models.systems.hub_forces.scene import Frame, HubScene, Method, Road
 from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import Tilt
 
-ORDER, LIFTING_ORDER = 4.0, 3.0
+TOLD_ORDERS, LIFTING_ORDER = 4.0, 3.0
 """Orders that errors are told by: of the classical Runge-Kutta method, and where wheels leave the road and land. Still
 longer steps would tell less than these: waves of the road have few of them."""
-MIDDLE = 0.4
+REPEATED_PART_START = 0.4
 """Share of a run after which a part of it is repeated, where no longer step can be."""
-LEAST = 1e-3
+LEAST_CHANGE_SHARE = 1e-3
 """Share of the largest change of any force, moment or angle below which another one carries nothing."""
-STILL = 1e-6
+STANDSTILL_CHANGE = 1e-6
 """rad, and share of the largest force, below which a change is rounding."""
-MOTION = {name: (column, "rad") for name, column in ANGLES.items()} | {"x": (X, "m"), "y": (Y, "m"), "z": (Z, "m")}
+MOTION_CHANNELS = {name: (column, "rad") for name, column in ANGLES.items()} | {
+    "x": (X, "m"),
+    "y": (Y, "m"),
+    "z": (Z, "m"),
+}
 """Channels of the chassis: its coordinate, and the unit of that."""
 
 
@@ -76,11 +80,11 @@ class Measurement:
         """
         scene, free = self.scene, self.forces.hub_inputs(step, steps, self.scene.forces.interpolation)
         if method == "kalman":
-            from models.systems.hub_forces.tilt_filter import pulled
+            from models.systems.hub_forces.tilt_filter import inputs_with_moments
 
-            return pulled(free, self.vehicle, self.tilt, step, scene.stabilise.bandwidth)
+            return inputs_with_moments(free, self.vehicle, self.tilt, step, scene.stabilise.bandwidth)
         if method == "prescribed":
-            return enforced(free, self.angles, step, scene.stabilise.smoothing, scene.file)
+            return enforced_inputs(free, self.angles, step, scene.stabilise.smoothing, scene.file)
         return free
 
     def start(self, hub_inputs: HubInputs) -> np.ndarray:
@@ -94,9 +98,9 @@ class Measurement:
         return start
 
 
-def enforced(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
+def enforced_inputs(hub_inputs: HubInputs, angles: Angles, step: float, smoothing: float, file: str = "") -> HubInputs:
     """Hub inputs with measured roll and pitch enforced, after a low-pass of ``smoothing`` (Hz); raises InputError."""
-    quiet = smoothed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
+    quiet = low_passed(angles.samples[:, :2], angles.period, smoothing, file, "stabilise.smoothing")
     return with_angles(hub_inputs, quiet, angles.period, step)
 
 
@@ -116,7 +120,7 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
         return Measurement(scene, vehicle, None, *scene.measured(vehicle))
     march = (engine, scene.settings(engine), scene.run.forces)
     true, errors = on_road(vehicle, road, scene.forces.frame, march, error and engine not in scene.engines)
-    forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
+    forces, angles = recorded_measurement(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
         forces = forces.noisy(scene.deviations(vehicle), scene.seed)
     if scene.angles.noise == "white":
@@ -150,7 +154,7 @@ def errors_of_steps(
     period: float = 0.0,
     forces: Route = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
-    """Estimated errors of the channels that ``principal`` lists, by name, and the method of the estimate.
+    """Estimated errors of the channels that ``principal_series`` lists, by name, and the method of the estimate.
 
     hub_inputs : function of a step (s) and a number of steps; period : of its samples (s), 0 for none: longer steps
     must divide it, or they would take the samples' noise for motion; forces : route by which the springs' are
@@ -164,7 +168,7 @@ def errors_of_steps(
             raise InputError(
                 "", "run.step", tried_step, "is not taken: longer steps must divide the period of the samples"
             )
-        row = 0 if factor > 1.0 else round(MIDDLE * steps)  # a road begins gently
+        row = 0 if factor > 1.0 else round(REPEATED_PART_START * steps)  # a road begins gently
         first = round(row / factor)
         inputs = hub_inputs(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
@@ -172,16 +176,16 @@ def errors_of_steps(
         path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(
             run.positions[row], run.rates[row]
         )
-        return principal(vehicle, path, first * tried_step)
+        return principal_series(vehicle, path, first * tried_step)
 
-    fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
+    fine, units = principal_series(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
-    order = LIFTING_ORDER if vehicle.uncut.lifts else ORDER
+    order = LIFTING_ORDER if vehicle.uncut.lifts else TOLD_ORDERS
     told, how = by_steps(fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step)
     return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
 
 
-def principal(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
+def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:
     """Channels whose error is estimated, over the time of a run that begins at ``start_time`` (s): forces of all
     elements, roll and pitch.
     """
@@ -194,11 +198,11 @@ def _moving_channels(channels: Mapping[str, np.ndarray], units: Mapping[str, str
     change = {name: float(np.std(values)) for name, values in channels.items()}
     most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
     largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)
-    still = {"rad": STILL, "N": STILL * largest, "N m": STILL * largest}
+    still = {"rad": STANDSTILL_CHANGE, "N": STANDSTILL_CHANGE * largest, "N m": STANDSTILL_CHANGE * largest}
     return {
         name: values
         for name, values in channels.items()
-        if change[name] > max(LEAST * most[units[name]], still[units[name]])
+        if change[name] > max(LEAST_CHANGE_SHARE * most[units[name]], still[units[name]])
     }
 
 
@@ -223,7 +227,7 @@ def run(
     begun = time.process_time()
     path = model.run(*np.split(measurement.start(hub_inputs), 2))
     seconds = time.process_time() - begun
-    result = labelled(measurement, path, engine, method, seconds)
+    result = labelled_result(measurement, path, engine, method, seconds)
     if not error:
         return result
     if engine in scene.engines:
@@ -234,16 +238,16 @@ def run(
         before := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much
         told = {name: summed_error(told[name], before[name]) for name in told if name in before and name not in ANGLES}
-    return stated(result, told, how)
+    return with_stated_errors(result, told, how)
 
 
-def labelled(
+def labelled_result(
     measurement: Measurement, path: HubRun, engine: str, method: str = ON_TYRES, seconds: float = 0.0
 ) -> Result:
     """The result of a run of the measurement's vehicle: chassis motion, section forces, and the moments that hold roll
     and pitch.
     """
-    channels = {name: Channel("time", path.states[:, column], unit) for name, (column, unit) in MOTION.items()}
+    channels = {name: Channel("time", path.states[:, column], unit) for name, (column, unit) in MOTION_CHANNELS.items()}
     channels |= {
         "section_force": Channel(("time", "element"), path.elements, "N", "compression; of bars a moment, N m"),
         "holding_moment": Channel(("time", "held"), path.moments, "N m", "of the stabiliser on roll and pitch"),
@@ -260,7 +264,7 @@ def labelled(
         engine=engine,
         counts=path.counts | {"states": path.states.shape[1]},
         seconds=seconds,
-        doubts=measurement.tilt.doubts if method == "kalman" else (),
+        doubts=measurement.tilt.objections if method == "kalman" else (),
         detail=path,
         method=method,
     )

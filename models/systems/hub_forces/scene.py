@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended, with_own
+from models.core.scene_effects import extended_by_effects, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
 from models.core.steps import divides, fitting
-from models.core.strict import Query, Strict, accepted, quantity
+from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, other_unit, read_time_series
 from models.engines.assembly import Settings
@@ -25,10 +25,22 @@ from models.vehicles.cut_vehicle import CutVehicle, cut
 Frame = Literal["hub", "body", "inertial"]
 Noise = Literal["white", "none"]
 Method = Literal["none", "kalman", "prescribed"]
-MOMENTS = {"N m": 1.0, "kN m": 1e3}
-COMPONENTS = {"fx": NEWTONS, "fy": NEWTONS, "fz": NEWTONS, "mx": MOMENTS, "my": MOMENTS, "mz": MOMENTS}
+FACTOR_TO_NEWTON_METRES = {"N m": 1.0, "kN m": 1e3}
+COLUMNS_OF_HUB = {
+    "fx": NEWTONS,
+    "fy": NEWTONS,
+    "fz": NEWTONS,
+    "mx": FACTOR_TO_NEWTON_METRES,
+    "my": FACTOR_TO_NEWTON_METRES,
+    "mz": FACTOR_TO_NEWTON_METRES,
+}
 """Columns of a hub, each after the hub's name and an underscore, with the factors of their units."""
-ANGLES = {"roll": RADIANS, "pitch": RADIANS, "roll_rate": RADIANS_PER_SECOND, "pitch_rate": RADIANS_PER_SECOND}
+COLUMNS_OF_ANGLES = {
+    "roll": RADIANS,
+    "pitch": RADIANS,
+    "roll_rate": RADIANS_PER_SECOND,
+    "pitch_rate": RADIANS_PER_SECOND,
+}
 """Columns of the measured angles; roll to the right and nose down are positive, as turns about x and y are."""
 
 
@@ -37,7 +49,7 @@ class Vehicle(Strict):
 
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     chassis: str = Field(default="body", description="the body with all six freedoms")
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class Run(Strict):
@@ -136,7 +148,7 @@ class HubScene(SceneFile):
     def cut_vehicle(self) -> CutVehicle:
         """The vehicle without its tyres; raises InputError."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        return cut(extended(vehicle, self), self.vehicle.chassis)
+        return cut(extended_by_effects(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
         """Standard deviations (6 h,) of the noise on each sample of hub forces, N and N m."""
@@ -145,7 +157,7 @@ class HubScene(SceneFile):
     def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:
         """Hub forces and angles of the scene's files; raises InputError."""
         assert self.forces.file is not None and self.angles.file is not None
-        columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COMPONENTS.items()}
+        columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COLUMNS_OF_HUB.items()}
         path = self.path(self.forces.file, "forces.file")
         forces, period = read_time_series(path, columns)
         if period > CHASSIS_SAMPLE_TIME:
@@ -155,7 +167,7 @@ class HubScene(SceneFile):
                 "in milliseconds, not in seconds, correct the unit that heads them"
             )
             raise InputError(self.file, "forces.file", self.forces.file, allowed)
-        angles, spacing = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
+        angles, spacing = read_time_series(self.path(self.angles.file, "angles.file"), COLUMNS_OF_ANGLES)
         if abs(spacing - period) > 1e-9 * period:
             raise InputError(
                 self.file,

@@ -13,42 +13,42 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.signals import Sampled
-from models.drift.score import SURPRISED
+from models.drift.score import DOUBTFUL_INNOVATION_LIMIT
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
 from models.systems.hub_forces.tilt_march import Noise, march
 from models.vehicles.cut_vehicle import CutVehicle, rigid
 
-SURPRISE = 4.0
+INNOVATION_LIMIT = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
 
-BIASED, SURE = 0.1, 4.0
+BIAS_IN_DEVIATIONS, BIAS_IN_STANDARD_ERRORS = 0.1, 4.0
 """Mean of a value's innovations, in deviations, and in its own standard errors, from which on it is called biased. One
 right run in 4000 passes the second; a gyro wrong by 0.1 degree/s has -0.35 and 27 in 15 s."""
-VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
-UNEXPLAINED = 0.65
+MEASURED_VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
+LARGEST_UNEXPLAINED = 0.65
 """Largest part of the measured rates that the hub forces do not explain. The rigid vehicle leaves 0.3 to 0.45 of them
 on rough roads, for its springs give; forces in another frame than stated leave 0.8, exchanged hubs 2 and more."""
-BALANCED = 15.0
+BALANCE_WINDOW = 15.0
 """s: the longest stretch over which moments are integrated to be compared with rates; beyond, small biases add up."""
-UNKNOWN = 0.1**2
+UNKNOWN_VARIANCE = 0.1**2
 """rad^2, rad^2/s^2: variance at the start of what is not measured there."""
-REMEDY = "check signs, units, order of the hubs and frame, or state larger deviations"
+SIGNAL_REMEDY = "check signs, units, order of the hubs and frame, or state larger deviations"
 
 
 @dataclass(frozen=True)
 class Tilt:
     """Output of the tilt filter. states (m, 4) : estimated roll, pitch and their rates; deviations : their standard
-    deviations; surprise : mean of the normalised innovation squared per measured value, 1 where the stated deviations
-    are right; doubts : objections to the measurement.
+    deviations; normalised_innovation : mean of the normalised innovation squared per measured value, 1 where the stated
+    deviations are right; objections : objections to the measurement.
     """
 
     states: np.ndarray
     deviations: np.ndarray
     period: float
-    surprise: float
-    doubts: tuple[str, ...] = ()
+    normalised_innovation: float
+    objections: tuple[str, ...] = ()
 
 
 @dataclass
@@ -82,7 +82,7 @@ class TiltFilter:
     """
 
     def __init__(self, vehicle: CutVehicle, frame: str, period: float, deviations: Deviations, file: str = "") -> None:
-        _check(frame, period, deviations)
+        _check_measurement(frame, period, deviations)
         self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
         self.forces_noise = self.rigid.turning(deviations.forces)[:2, :2]
         push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
@@ -103,28 +103,29 @@ class TiltFilter:
         if np.isnan(state.x[0]):
             state.x, state.p = (
                 np.nan_to_num(angles[0]),
-                np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.noise.variances)),
+                np.diag(np.where(np.isnan(angles[0]), UNKNOWN_VARIANCE, self.noise.variances)),
             )
-        level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
+        level = _wrenches_in_level_axes(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
         turning, kept = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
         state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, kept)
-        if not self.surprise <= SURPRISE:
+        if not self.normalised_innovation <= INNOVATION_LIMIT:
             raise InputError(
                 self.file,
                 "angles",
                 None,
                 "contradict the hub forces: the squares of the innovations are "
-                f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}",
+                f"{self.normalised_innovation:.3g} times what the deviations allow (at most "
+                f"{INNOVATION_LIMIT:g}): {SIGNAL_REMEDY}",
             )
         return kept[0], kept[1]
 
     @property
-    def surprise(self) -> float:
+    def normalised_innovation(self) -> float:
         """Mean of the normalised innovations squared per measured value."""
         return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
 
-    def biases(self) -> tuple[np.ndarray, np.ndarray]:
+    def innovation_biases(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
 
         The springs of the vehicle, which the filter takes for noise, make successive innovations correlated. The number
@@ -136,22 +137,24 @@ class TiltFilter:
         along = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
         return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
 
-    def doubts(self) -> tuple[str, ...]:
+    def objections(self) -> tuple[str, ...]:
         """Objections to the measurement because innovations are too large or have a mean. A constant error of an angle
         leaves no trace in them.
         """
         large = (
-            f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
-            f"to {SURPRISED:g} is not said): {REMEDY}"
+            f"the filter's innovations squared are {self.normalised_innovation:.3g} times what the "
+            "stated deviations allow (up "
+            f"to {DOUBTFUL_INNOVATION_LIMIT:g} is not said): {SIGNAL_REMEDY}"
         )
-        mean, error = self.biases()
+        mean, error = self.innovation_biases()
         biased = [
             f"the filter's innovations of {name} have a mean of {average:+.2g} deviations (of a right filter at most "
-            f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
-            for name, average, wide in zip(VALUES, mean, error, strict=True)
-            if abs(average) > max(BIASED, SURE * wide)
+            f"{BIAS_IN_DEVIATIONS:g}, and {BIAS_IN_STANDARD_ERRORS * wide:.2g} by chance): a gyro or "
+            "forces have an offset, or an angle drifts"
+            for name, average, wide in zip(MEASURED_VALUES, mean, error, strict=True)
+            if abs(average) > max(BIAS_IN_DEVIATIONS, BIAS_IN_STANDARD_ERRORS * wide)
         ]
-        return (*([large] if self.surprise > SURPRISED else []), *biased)
+        return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
     def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
@@ -161,7 +164,7 @@ class TiltFilter:
 
         turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
         """
-        dt, length = self.period, round(BALANCED / self.period)
+        dt, length = self.period, round(BALANCE_WINDOW / self.period)
         for first in range(0, len(rates) - 1, length):
             part, measured = turning[first : first + length + 1], rates[first : first + length + 1]
             if not np.isfinite(measured).all():
@@ -173,12 +176,15 @@ class TiltFilter:
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
         for name, part in zip(("roll", "pitch"), share, strict=True):
-            if not part <= UNEXPLAINED:
-                said = f"{part:.0%} of it is not the integral of their moment (at most {UNEXPLAINED:.0%}): {REMEDY}"
+            if not part <= LARGEST_UNEXPLAINED:
+                said = (
+                    f"{part:.0%} of it is not the integral of their moment (at most "
+                    f"{LARGEST_UNEXPLAINED:.0%}): {SIGNAL_REMEDY}"
+                )
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {said}")
 
 
-def _check(frame: str, period: float, deviations: Deviations) -> None:
+def _check_measurement(frame: str, period: float, deviations: Deviations) -> None:
     """Refuse an unknown frame, and periods and deviations that are not above 0 and finite: no value is without
     error.
     """
@@ -216,17 +222,17 @@ def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations:
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
     tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, deviations, file)
     states, spread = tilt_filter.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, tilt_filter.surprise, tilt_filter.doubts())
+    return Tilt(states, spread, forces.period, tilt_filter.normalised_innovation, tilt_filter.objections())
 
 
-def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def _wrenches_in_level_axes(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Wrenches (m, 6 h) turned from the axes of space into axes that roll and pitch by angles (m, 2 or more), rad."""
     (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
     turned = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
     return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), turned).reshape(wrenches.shape)
 
 
-def pulled(
+def inputs_with_moments(
     hub_inputs: HubInputs, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7
 ) -> HubInputs:
     """Hub inputs with moments that pull roll and pitch towards the filter's estimate. They act as a spring and damper:

@@ -30,7 +30,7 @@ def march(x, p, turning, measured, noise, sums, kept):
     gain, surprise, used, variances = np.empty(4), 0.0, 0, noise.variances
     for i in range(len(measured)):
         if i:
-            _predict(x, p, turning[i - 1], noise)
+            _predict_step(x, p, turning[i - 1], noise)
             for j in range(4):
                 if np.isnan(measured[i, j]):
                     continue
@@ -47,14 +47,14 @@ def march(x, p, turning, measured, noise, sums, kept):
                     gain[k] = p[k, j] / s
                 for k in range(4):
                     x[k] += gain[k] * off
-                _learn(p, gain, j, variances[j], variances[j] / s)
+                _update_with_value(p, gain, j, variances[j], variances[j] / s)
         for k in range(4):
             kept[0, i, k], kept[1, i, k] = x[k], np.sqrt(p[k, k])
     return surprise, used
 
 
 @njit(cache=True, error_model="numpy")
-def _learn(p, gain, j, variance, kept):
+def _update_with_value(p, gain, j, variance, kept):
     """Update the covariance with value j in Joseph's form, which no rounding makes negative.
 
     kept : ratio of the value's variance to the innovation's, which is 1 - gain[j] computed without cancellation. The
@@ -80,7 +80,7 @@ def _learn(p, gain, j, variance, kept):
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x, p, turning, noise):
+def _predict_step(x, p, turning, noise):
     """Predict one step: the angles change by their rates, the rates by an acceleration, and the covariance
     accordingly.
     """

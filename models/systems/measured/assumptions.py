@@ -7,14 +7,20 @@ import numpy as np
 from models.core.assumptions import Assumption, Watched
 from models.engines.cut_vehicle import UPRIGHT
 from models.measured.checks.clipped import clipping_extremes
-from models.systems.hub_forces.assumptions import BALANCE, SMALL, TURNED, carried_weight_share, inside
+from models.systems.hub_forces.assumptions import (
+    LARGEST_IMBALANCE,
+    SMALL_ANGLE,
+    TURNED_FORCE_ANGLE,
+    carried_weight_share,
+    usual_travel_assumptions,
+)
 from models.systems.measured.scene import MeasuredScene
 from models.vehicles.cut_vehicle import CutVehicle
 
 if TYPE_CHECKING:
     from models.systems.measured.run import Examination
 
-PULL = 0.2
+LARGEST_PULL_SHARE = 0.2
 """Of the load at rest: the weight and inertia of a rim and tyre in the air; whatever pulls more is no road."""
 
 
@@ -46,7 +52,7 @@ def _in_range(examination: "Examination | None") -> Assumption:
         "measure again with a wider range, or leave these times out by [clock]",
         lambda run: clipped(),
         "of the samples",
-        most=0.0,
+        upper_limit=0.0,
     )
 
 
@@ -78,7 +84,7 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
         else 'use stabilise.method = "kalman" or "prescribed", or end the run before by clock.duration'
     )
     says = "the filter takes angles for turns about the body's axes" if filtered else "the vehicle stays upright"
-    most = SMALL if filtered else UPRIGHT
+    most = SMALL_ANGLE if filtered else UPRIGHT
     listed = [
         Assumption("small tilt" if filtered else "upright", says, remedy, lambda run: tilt(), "rad", -most, most),
         Assumption(
@@ -89,7 +95,7 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
                 hub: force / load for (hub, force), load in zip(vertical().items(), vehicle.loads, strict=True)
             },
             "of the load at rest",
-            least=-PULL,
+            lower_limit=-LARGEST_PULL_SHARE,
         ),
         Assumption(
             "balance",
@@ -97,10 +103,10 @@ def _in_space(scene: MeasuredScene, vehicle: CutVehicle, examination: "Examinati
             "correct the loads of the vehicle file, or zero and unit of the forces in the channel map",
             lambda run: balance(),
             "of the weight",
-            1.0 - BALANCE,
-            1.0 + BALANCE,
+            1.0 - LARGEST_IMBALANCE,
+            1.0 + LARGEST_IMBALANCE,
         ),
-        *inside(
+        *usual_travel_assumptions(
             vehicle,
             lambda run: {each.name: read(f"{each.name} travel") for each in vehicle.elements},
             "leave these times out by [clock]: no stop is in the cut vehicle's linear springs",
@@ -137,7 +143,7 @@ def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, examination: "Exam
             'use stabilise.method = "kalman" or "prescribed"',
             lambda run: beside(),
             "rad",
-            -TURNED,
-            TURNED,
+            -TURNED_FORCE_ANGLE,
+            TURNED_FORCE_ANGLE,
         )
     ]

@@ -4,13 +4,13 @@ import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from models.core.errors import InputError, suggestion
+from models.core.errors import InputError, suggestion_phrase
 from models.measured.channel import Channel, Source
 from models.measured.signal import Frame, Places, Quantity, Signal
-from models.measured.units import conversion
+from models.measured.units import factor_to_si
 from models.systems.measured.scene import MappedChannel, MeasuredScene
 
-AXES: dict[Quantity, tuple[str, ...]] = {
+COMPONENTS_OF_QUANTITY: dict[Quantity, tuple[str, ...]] = {
     **dict.fromkeys(("force", "moment", "acceleration"), ("x", "y", "z")),
     **dict.fromkeys(("angular rate", "angle"), ("roll", "pitch", "yaw")),
     **dict.fromkeys(("travel", "strain"), ()),
@@ -18,7 +18,7 @@ AXES: dict[Quantity, tuple[str, ...]] = {
 """Components that a quantity can have; none along a connector, which has its own direction."""
 
 
-def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
+def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> tuple[Signal, ...]:
     """Signals in the order of the scene; ``sources`` are the scene's opened files, in the scene's order.
 
     What is measured at a connector, and any strain, is only compared with. Raises InputError at the first channel that
@@ -32,7 +32,7 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     names, mapped = [row.channel for _, row, _ in rows], list[Signal]()
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
-        signal = _signal(scene.file, place, row, source, places, name)
+        signal = _signal_of_entry(scene.file, place, row, source, places, name)
         for before in mapped:
             if before.name == signal.name:
                 raise InputError(scene.file, place, row.channel, "is mapped twice: each channel is one signal")
@@ -48,7 +48,7 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     return tuple(mapped)
 
 
-def _signal(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
+def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
     channel, at_hub = find(source, row.channel, file, place), row.at in places.hubs
     unit, where = row.unit, (file, f"{place}, unit")
     if unit is None:
@@ -56,7 +56,7 @@ def _signal(file: str, place: str, row: MappedChannel, source: Source, places: P
         if not unit and row.quantity != "strain":
             missing = f"is missing: {source.path.name} names none of {row.channel!r}"
             raise InputError(file, f"{place}, unit", None, missing)
-    factor = conversion(unit, row.quantity, *where)
+    factor = factor_to_si(unit, row.quantity, *where)
     _check_place(file, place, row, places)
     usual: Frame = "hub" if at_hub else "inertial" if row.quantity == "angle" else "body"
     frame, frames = row.frame or usual, ("hub", "body", "inertial") if at_hub else ("body", "inertial", "sensor")
@@ -98,10 +98,10 @@ def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> N
     every = tuple(name for names in kinds.values() for name in names)
     if kinds and row.at not in every:
         known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names)
-        text = f"the vehicle has no such place for {row.quantity} ({known}){suggestion(row.at, every)}"
+        text = f"the vehicle has no such place for {row.quantity} ({known}){suggestion_phrase(row.at, every)}"
         raise InputError(file, f"{place}, at", row.at, text)
     along = row.at in places.connectors and row.quantity in ("force", "moment")
-    axes = () if along else AXES[row.quantity]
+    axes = () if along else COMPONENTS_OF_QUANTITY[row.quantity]
     if row.component not in (axes or ("",)):
         allowed = "has a direction of its own: leave component out"
         if axes:

@@ -17,23 +17,28 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding, Weight
-from models.core.scene_effects import extended
+from models.core.scene_effects import extended_by_effects
 from models.core.whole_files import write_whole
-from models.measured.channel import BLOCK, Source
+from models.measured.channel import SAMPLES_PER_BLOCK, Source
 from models.measured.columns import Columns
 from models.measured.gaps import without_absurd
 from models.measured.recording import Progress, Recording, no_progress
 from models.measured.resampling import EQUAL_RATES, resample_to
 from models.measured.signal import Signal
-from models.measured.timing import EVEN_CLOCK_SHARE, Timing, timing
+from models.measured.timing import EVEN_CLOCK_SHARE, Timing, sample_timing
 from models.systems.measured.scene import MeasuredScene
 
-COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
-LEAST = 100
+COLUMNS_FILE, RAW_COLUMNS_FILE, SOURCES_FILE, ABSURD_VALUES_FILE = (
+    "recording.columns",
+    "raw.columns",
+    "sources.json",
+    "no_value.json",
+)
+FEWEST_SAMPLES = 100
 """Samples of the shortest recording."""
-SLOW = {"force": 0.02, "moment": 0.02, "acceleration": 1.0, "angular rate": 1.0}
+SLOWEST_SPACING = {"force": 0.02, "moment": 0.02, "acceleration": 1.0, "angular rate": 1.0}
 """s between samples beyond which a channel shows nothing of its quantity; wheel forces move with up to 25 Hz."""
-FAST = 60e3
+FASTEST_RATE = 60e3
 """Hz: no amplifier of wheel forces or gyros is faster."""
 
 
@@ -77,7 +82,7 @@ class ClockGrid:
         return np.rint((times - self.start) / self.period).astype(np.int64)
 
 
-def record(
+def record_on_clock(
     scene: MeasuredScene,
     sources: Sequence[Source],
     signals: Sequence[Signal],
@@ -94,32 +99,34 @@ def record(
     shifts, start, noticed = file_shifts(scene, sources)
     progress("reading times", 0.0)
     placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
-    groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
+    groups = [each for source, shift, drift in placing for each in _mapped_groups(source, signals, shift, drift)]
     leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
     if not leading:
         needed = "no channel is mapped to a hub: wheel forces are what drives the vehicle"
         raise InputError(scene.file, "files", None, needed)
-    grid = _grid(scene, leading)
+    grid = _clock_grid(scene, leading)
     noticed += [finding for group in groups for finding in (*_of_group(group), *_check_cover(scene, group, grid))]
-    columns = _columns(folder, scene, signals, sources, grid)
+    columns = _recording_columns(folder, scene, signals, sources, grid)
     if columns.done < grid.count:
         absurd = list[Finding]()
         for i, group in enumerate(groups):
             progress(f"reading {group.source.path.name}", i / len(groups))
-            absurd += (_direct if _is_on_clock(group, grid) else _resampled)(group, grid, columns, folder)
-        _referred(scene, signals, columns)
-        (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
+            absurd += (_write_unchanged if _is_on_clock(group, grid) else _write_resampled)(
+                group, grid, columns, folder
+            )
+        _moments_at_hubs(scene, signals, columns)
+        (folder / ABSURD_VALUES_FILE).write_text(json.dumps([asdict(finding) for finding in absurd]))
         columns.close(grid.count)
-    for row in json.loads((folder / ABSURD).read_text()):  # of this run, or of one that was killed
+    for row in json.loads((folder / ABSURD_VALUES_FILE).read_text()):  # of this run, or of one that was killed
         noticed.append(Finding(**row | {key: tuple(row[key]) for key in ("signals", "times")}))
     began = start + timedelta(seconds=grid.start) if start else None
     comment = "\n".join(source.comment for source in sources if source.comment)
     said = [finding for source in sources for finding in source.noticed]
-    said += [*noticed, _rule(scene, groups, grid)]
-    return extended(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
+    said += [*noticed, _clock_finding(scene, groups, grid)]
+    return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
 
 
-def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
+def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
     """Convert moments that were measured about points above or below hubs to moments about the hubs: (Mx - r Fy, My + r
     Fx) for a point r above.
     """
@@ -132,7 +139,7 @@ def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns)
                 columns.put((moment,), 0, values[:, None])
 
 
-def _rule(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Finding:
+def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Finding:
     """A finding on how all channels were brought onto one clock."""
     ways: dict[str, list[str]] = {}
     for group in groups:
@@ -161,7 +168,7 @@ def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[f
     return offsets, None, [Finding("start", "doubt" if several else "note", unsaid, f"{text}.")]
 
 
-def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
+def _mapped_groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
     """Groups of a file that have mapped channels, with their times shifted to the common time."""
     of = {channel.name: channel.group for channel in source.channels}
     mapped = dict[int, list[Signal]]()
@@ -170,7 +177,7 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
     for first, *others in mapped.values():
         times = np.concatenate([block.times for block in source.blocks([first.channel])])
         where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {first.channel} ..."
-        clock = timing(times, where, (first.name,))
+        clock = sample_timing(times, where, (first.name,))
         slowed = replace(clock, times=clock.times / (1 + drift) + shift, period=clock.period / (1 + drift))
         yield ClockGroup(source, (first, *others), slowed)
 
@@ -179,9 +186,9 @@ def _of_group(group: ClockGroup) -> Iterator[Finding]:
     """Findings on the times of a group, for example that these seem to be in another unit."""
     yield from group.timing.findings
     clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
-    slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)
+    slowest = min(SLOWEST_SPACING.get(s.quantity, np.inf) for s in group.signals)
     slow = clock.period > slowest
-    if not slow and clock.rate < FAST:
+    if not slow and clock.rate < FASTEST_RATE:
         return
     true, written = ("milliseconds", "seconds") if slow else ("seconds", "milliseconds")
     text = (
@@ -194,7 +201,7 @@ def _of_group(group: ClockGroup) -> Iterator[Finding]:
     yield Finding("times", weight, where, text, clock.period, "s", (group.signals[0].name,))
 
 
-def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
+def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
     """Sample times of the recording. InputError where the wheel forces do not overlap in time, or do not allow the
     settings of [clock].
     """
@@ -216,8 +223,8 @@ def _grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
     count = int(np.floor((end - start) / period + EVEN_CLOCK_SHARE)) + 1
     if settings.duration is not None and start + settings.duration > last + period:
         raise InputError(file, "clock.duration", settings.duration, f"the wheel forces last {last - start:.6g} s")
-    if count < LEAST:
-        few = f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
+    if count < FEWEST_SAMPLES:
+        few = f"{count} sample(s) of wheel forces are left: at least {FEWEST_SAMPLES} are needed"
         raise InputError(file, "clock", None, few)
     return ClockGrid(start, period, count)
 
@@ -239,7 +246,7 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
         yield Finding("overlap", "doubt", name, text, missing, "s", (group.signals[0].name,))
 
 
-def _columns(
+def _recording_columns(
     folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: ClockGrid
 ) -> Columns:
     """Columns of this recording, new or begun earlier from the same files; InputError where the folder holds other
@@ -248,11 +255,11 @@ def _columns(
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
     now = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}
-    path = folder / SOURCES
+    path = folder / SOURCES_FILE
     if path.is_file() and json.loads(path.read_text()) != now:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
     write_whole(path, json.dumps(now))
-    return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
+    return Columns(folder / COLUMNS_FILE, tuple(signal.name for signal in signals), grid.count)
 
 
 def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
@@ -268,7 +275,7 @@ def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     )
 
 
-def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
+def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
     """Write samples that are on the clock already into the columns, block by block, NaN in gaps; returns findings on
     absurd values.
     """
@@ -276,9 +283,9 @@ def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) 
 
     def put(last_index: int, indices: np.ndarray, si: np.ndarray) -> None:
         """Write the samples up to ``last_index``: values ``si`` at ``indices``, NaN at the others."""
-        for first in range(done, last_index, BLOCK):
-            here = (indices >= first) & (indices < min(first + BLOCK, last_index))
-            values = np.full((min(BLOCK, last_index - first), len(names)), np.nan)
+        for first in range(done, last_index, SAMPLES_PER_BLOCK):
+            here = (indices >= first) & (indices < min(first + SAMPLES_PER_BLOCK, last_index))
+            values = np.full((min(SAMPLES_PER_BLOCK, last_index - first), len(names)), np.nan)
             values[indices[here] - first] = si[here]
             columns.put(names, first, values)
 
@@ -298,13 +305,13 @@ def _direct(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) 
     return absurd
 
 
-def _resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
+def _write_resampled(group: ClockGroup, grid: ClockGrid, columns: Columns, folder: Path) -> list[Finding]:
     """Bring samples of another clock onto this one: copy them to a file, then interpolate one signal after another.
     Returns findings on absurd values.
     """
     clock, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
-    raw = Columns(folder / RAW, group.names, count)
+    raw = Columns(folder / RAW_COLUMNS_FILE, group.names, count)
     for block in group.source.blocks(group.names):
         raw.put(group.names, block.first, group.si(block.values))
     for signal in group.signals:

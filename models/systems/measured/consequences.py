@@ -4,7 +4,7 @@ right.
 A finding that names its size says how to put it right: a late channel is shifted, a wrong factor taken out, a spike
 left out. Of a gap nobody knows what was lost: there the deviation that its bridge is known to is planted instead. The
 two runs differ by what the finding does to every section force, as rms and as damage. A long recording is run for
-``LONGEST`` s, about the place where the finding is worst.
+``LONGEST_RERUN`` s, about the place where the finding is worst.
 """
 
 import shutil
@@ -16,25 +16,25 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.finding import LISTED_FINDINGS, Finding
-from models.drift.score import Verdict, rms
-from models.fatigue.damage import SLOPE, damage_ratio
-from models.measured.checks.spikes import spikes
+from models.drift.score import Verdict, root_mean_square
+from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
+from models.measured.checks.spikes import spike_positions
 from models.measured.columns import Columns
-from models.measured.gaps import BRIDGED, filled
+from models.measured.gaps import LONGEST_BRIDGED_GAP, filled_samples
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
-LONGEST = 30.0
+LONGEST_RERUN = 30.0
 """s of a recording that are run for a finding."""
-FORCE, DAMAGE = (0.05, 0.15), (0.05, 0.25)
+FORCE_LIMITS, DAMAGE_LIMITS = (0.05, 0.15), (0.05, 0.25)
 """Change of a section force, rms by its own rms without its mean, and |damage ratio - 1|: up to the first the run is
 accepted, beyond the second it is rejected, between the two it is accepted with doubt. 5 % of an amplitude are 28 % of
 damage of slope 5."""
-SMALL = 0.02
+NEGLIGIBLE_FORCE_SHARE = 0.02
 """Of the largest rms in the same unit: a section force that is smaller carries nothing that could be wrong."""
-SETTLING = 1.0
+SETTLING_DURATION = 1.0
 """s at the beginning that are not compared: there the run settles."""
 Samples = dict[Signal, np.ndarray]
 Run = Callable[[Recording, Path], SectionOutcome]
@@ -48,26 +48,29 @@ class Consequence:
     """
 
     finding: Finding
-    section: str = ""
+    section_force: str = ""
     force: float = np.nan
     damage: float = np.nan
 
     @property
     def grade(self) -> int:
         """Grade of the consequence: 0 harmless, 1 doubtful or unknown, 2 not acceptable."""
-        if not self.section:
+        if not self.section_force:
             return 1
         return max(
             sum(abs(value) > bound for bound in bounds)
-            for value, bounds in ((self.force, FORCE), (self.damage - 1.0, DAMAGE))
+            for value, bounds in ((self.force, FORCE_LIMITS), (self.damage - 1.0, DAMAGE_LIMITS))
         )
 
     def __str__(self) -> str:
         """The consequence with its figures, as a sentence for an engineer."""
         where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
-        if not self.section:
+        if not self.section_force:
             return f"{where}: what it does to the section forces is not known"
-        return f"{where}: changes {self.section} by {self.force:.1%} of its rms, its damage is {self.damage:.3g} times"
+        return (
+            f"{where}: changes {self.section_force} by {self.force:.1%} of its rms, its damage is "
+            f"{self.damage:.3g} times"
+        )
 
 
 def consequences(
@@ -81,10 +84,10 @@ def consequences(
 
     def consequence(number: int, finding: Finding) -> Consequence:
         signals = [s for s in recording.signals if s.name in finding.signals]
-        right = CORRECTIONS.get(finding.check)
+        right = CORRECTION_OF_CHECK.get(finding.check)
         if right is None or not signals:
             return Consequence(finding)
-        first, count = _window(finding, recording)
+        first, count = _judged_window(finding, recording)
         samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
         corrected, begun, place = (
             right(finding, signals, samples, recording.period),
@@ -108,7 +111,10 @@ def verdict_with_consequences(verdict: Verdict, consequences: Sequence[Consequen
     if verdict.word != "accepted" or worst == 0:
         return verdict
     reason = "; ".join(consequence_texts(consequence for consequence in consequences if consequence.grade == worst))
-    bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
+    bounds = (
+        f"accepted up to {FORCE_LIMITS[0]:.0%} and {DAMAGE_LIMITS[0]:.0%}, rejected beyond "
+        f"{FORCE_LIMITS[1]:.0%} and {DAMAGE_LIMITS[1]:.0%}"
+    )
     return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
@@ -133,11 +139,11 @@ def _distinct_doubts(findings: Iterable[Finding]) -> list[Finding]:
     return list(reversed(first.values()))
 
 
-def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
+def _judged_window(finding: Finding, recording: Recording) -> tuple[int, int]:
     """First sample and number of samples that are run to judge a finding."""
-    count = min(recording.count, round(LONGEST / recording.period) + 1)
+    count = min(recording.count, round(LONGEST_RERUN / recording.period) + 1)
     middle = finding.times[0] if finding.times else 0.0
-    first = min(max(round((middle - LONGEST / 2) / recording.period), 0), recording.count - count)
+    first = min(max(round((middle - LONGEST_RERUN / 2) / recording.period), 0), recording.count - count)
     return first, count
 
 
@@ -154,14 +160,19 @@ def _most_changed_force(
     finding: Finding, recorded: SectionOutcome, right: SectionOutcome, answers: Sequence[SectionChannel]
 ) -> Consequence:
     """Consequence for the section force that changes most, among those that are not negligibly small."""
-    first = min(round(SETTLING / right.period), right.done // 4)
+    first = min(round(SETTLING_DURATION / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
-    size = {a: rms(measured - measured.mean()) for a, (_, measured) in pairs.items()}
+    size = {a: root_mean_square(measured - measured.mean()) for a, (_, measured) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
     every = [
-        Consequence(finding, a.name, rms(computed - measured) / size[a], damage_ratio(computed, measured, SLOPE))
+        Consequence(
+            finding,
+            a.name,
+            root_mean_square(computed - measured) / size[a],
+            damage_ratio(computed, measured, WOEHLER_SLOPE),
+        )
         for a, (computed, measured) in pairs.items()
-        if size[a] > SMALL * most[a.unit]
+        if size[a] > NEGLIGIBLE_FORCE_SHARE * most[a.unit]
     ]
     return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
@@ -192,11 +203,11 @@ def _divided_by_factor(finding: Finding, signals: Sequence[Signal], samples: Sam
     return {s: samples[s] / factor for s in signals}
 
 
-def _offset(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _offset_removed(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     return {s: samples[s] - (finding.size or 0.0) for s in signals}
 
 
-def _referred(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _moments_corrected(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     force = {(s.at, s.component): s for s in samples if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
     return {
@@ -206,7 +217,7 @@ def _referred(finding: Finding, signals: Sequence[Signal], samples: Samples, per
     }
 
 
-def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _channels_exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     first, second = signals
     return {first: samples[second], second: samples[first]}
 
@@ -215,35 +226,35 @@ def _without_spikes(finding: Finding, signals: Sequence[Signal], samples: Sample
     """Samples without spikes of one or two samples."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
-        at, values = spikes(samples[s])[0], samples[s].copy()
+        at, values = spike_positions(samples[s])[0], samples[s].copy()
         values[np.minimum(np.concatenate((at, at + 1)), len(values) - 1)] = np.nan
-        out[s] = filled(values, period, BRIDGED)[0]
+        out[s] = filled_samples(values, period, LONGEST_BRIDGED_GAP)[0]
     return out
 
 
-def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+def _bridge_varied(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
     """Samples with gaps bridged as for the run, plus or minus the bridge's standard deviation, gap by gap in turn."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
         if s.quantity in ("force", "moment"):
-            values, gaps = filled(samples[s], period, BRIDGED)
+            values, gaps = filled_samples(samples[s], period, LONGEST_BRIDGED_GAP)
             out[s] = values.copy()
             for number, gap in enumerate(gaps):
-                out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.doubt)
+                out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.largest_deviation)
     return out
 
 
-CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
+CORRECTION_OF_CHECK: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
     "shift": _read_later,
     "drift": _read_later,
     "gain": _divided_by_factor,
     "sign": _divided_by_factor,
     "unit": _divided_by_factor,
-    "offset": _offset,
-    "lever": _referred,
-    "exchanged": _exchanged,
+    "offset": _offset_removed,
+    "lever": _moments_corrected,
+    "exchanged": _channels_exchanged,
     "spikes": _without_spikes,
-    "gaps": _bridged,
-    "no value": _bridged,
+    "gaps": _bridge_varied,
+    "no value": _bridge_varied,
 }
 """By the name of the check."""

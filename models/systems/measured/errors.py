@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed_error
-from models.systems.hub_forces.run import LEAST, ORDER
+from models.core.discretisation import Estimate, estimate, estimate_rescaled, size_of, summed_error
+from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, TOLD_ORDERS
 from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
 
-SHARE, LONGEST = 0.2, 30.0
+REPEATED_SHARE, LONGEST_REPEAT = 0.2, 30.0
 """Share of a recording that is run again, in its steps and in half of them: 0.6 of its force calls; and s at most."""
 
 
@@ -30,7 +30,7 @@ def errors_of_steps(
     stretch, which begins at rest in the middle of the recording, does not end.
     """
     grid, recording = job.grid, job.recording
-    count = round(min(SHARE * recording.duration, LONGEST) / recording.period) + 1
+    count = round(min(REPEATED_SHARE * recording.duration, LONGEST_REPEAT) / recording.period) + 1
     first = (recording.count - count) // 2
     samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
     shutil.rmtree(folder, ignore_errors=True)
@@ -38,19 +38,19 @@ def errors_of_steps(
     coarse = march(part, folder / "own")
     fine = march(replace(part, step=0.5 * grid.step), folder / "half")
     every, told = round(coarse.period / fine.period), dict[str, Estimate]()
-    for name, element in _principal(job, outcome, bool(before)).items():
-        error = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), ORDER, grid.step)
+    for name, element in _principal_channels(job, outcome, bool(before)).items():
+        error = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), TOLD_ORDERS, grid.step)
         scaled = replace(
             error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
         )
-        told[name] = rescaled(scaled, size_of(outcome.samples(name)), grid.step)
+        told[name] = estimate_rescaled(scaled, size_of(outcome.samples(name)), grid.step)
         if element in before:
             told[name] = summed_error(told[name], before[element])
     shutil.rmtree(folder, ignore_errors=True)
     return told
 
 
-def _principal(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
+def _principal_channels(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
     """Channels whose error is estimated, each with its element ("" for an angle), without channels that hardly move.
 
     After a virtual measurement roll and pitch are left out: errors of measured moments accumulate in them.
@@ -61,7 +61,7 @@ def _principal(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[
     change = {name: float(np.std(outcome.samples(name))) for name in names}
     kinds = {name: elements.get(element, "rad") for name, element in names.items()}
     most = {kind: max(change[name] for name in names if kinds[name] == kind) for kind in kinds.values()}
-    return {name: element for name, element in names.items() if change[name] > LEAST * most[kinds[name]]}
+    return {name: element for name, element in names.items() if change[name] > LEAST_CHANGE_SHARE * most[kinds[name]]}
 
 
 def _unit(job: SectionRun, element: str) -> str:

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Channel, Result, result
-from models.drift.score import rms
-from models.fatigue.counting import Counted
-from models.measured.channel import BLOCK
+from models.drift.score import root_mean_square
+from models.fatigue.counting import CountedLoad
+from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
 
-FILES = "section_forces"
+FILE_STEM = "section_forces"
 """Name of the files that are handed on, before their extensions."""
-FIGURES = ("least", "greatest", "mean")
+COUNTED_FIGURES = {"least": "smallest_load", "greatest": "largest_load", "mean": "mean"}
 
 
 def hand_on(
@@ -41,12 +41,12 @@ def hand_on(
     names, units, comments = (tuple(getattr(a, key) for a in answers) for key in ("name", "unit", "comment"))
 
     def blocks() -> Iterator[np.ndarray]:
-        for first in range(0, outcome.done, BLOCK):
-            yield outcome.columns.block(names, first, min(BLOCK, outcome.done - first))
+        for first in range(0, outcome.done, SAMPLES_PER_BLOCK):
+            yield outcome.columns.block(names, first, min(SAMPLES_PER_BLOCK, outcome.done - first))
 
     return [
         write(
-            folder / f"{FILES}.{form}",
+            folder / f"{FILE_STEM}.{form}",
             [ChannelGroup(names, units, comments, outcome.period, outcome.done, blocks())],
             start,
             comment,
@@ -60,8 +60,8 @@ def forces(answers: Iterable[SectionChannel]) -> tuple[SectionChannel, ...]:
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 
-def labelled(
-    scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, Counted], folder: Path, **more: Any
+def labelled_result(
+    scene: Any, outcome: SectionOutcome | None, counted: Mapping[SectionChannel, CountedLoad], folder: Path, **more: Any
 ) -> Result:
     """The result of a run whose columns lie in ``folder``. Without an outcome it has attributes only.
 
@@ -72,7 +72,7 @@ def labelled(
     if outcome is not None:
         more["columns"] = str(outcome.columns.path.relative_to(folder))
         more["columns_of"] = json.dumps([answer.name for answer in outcome.answers])
-        if outcome.done <= BLOCK:
+        if outcome.done <= SAMPLES_PER_BLOCK:
             axes["time"] = Channel("time", outcome.period * np.arange(outcome.done), "s", "time")
             for answer in outcome.answers:
                 name = answer.name.replace("/", "|")  # which would be a group of the file
@@ -82,8 +82,11 @@ def labelled(
         slopes = list(next(iter(counted.values())).damage)
         axes["section_force"] = Channel("section_force", [answer.name for answer in counted])
         axes["slope"] = Channel("slope", slopes, "1", "Woehler exponent")
-        figures = {name: [getattr(counts, name) for counts in counted.values()] for name in FIGURES}
-        figures["rms"] = [rms(outcome.samples(answer)) for answer in counted]
+        figures = {
+            name: [getattr(counts, attribute) for counts in counted.values()]
+            for name, attribute in COUNTED_FIGURES.items()
+        }
+        figures["rms"] = [root_mean_square(outcome.samples(answer)) for answer in counted]
         channels |= {name: Channel("section_force", values, "", unit) for name, values in figures.items()}
         channels["unit"] = Channel("section_force", [answer.unit for answer in counted])
         meaning = f"pseudo-damage: {unit}, to the slope"

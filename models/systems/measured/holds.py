@@ -9,9 +9,14 @@ from models.measured.signal import Quantity
 from models.systems.measured.scene import Deviations, MeasuredScene
 from models.systems.measured.section_run import AttitudeHold
 
-FREE = "free"
+FREE_RUN = "free"
 """Name of the run without a stabiliser."""
-NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
+QUANTITY_OF_NOISE_KEY: dict[str, Quantity] = {
+    "force": "force",
+    "moment": "moment",
+    "angle": "angle",
+    "rate": "angular rate",
+}
 """Keys of the scene's table ``noise``, and the quantities that they are of."""
 
 
@@ -25,7 +30,7 @@ def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHo
             stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
         )
     }
-    return {FREE: AttitudeHold("none", **deviations)} | ({} if stabilised.method == "none" else held)
+    return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if stabilised.method == "none" else held)
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
@@ -33,7 +38,7 @@ def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
     transducers, since filters hide noise.
     """
     deviations = dict[str, float]()
-    for key, quantity in NOISE.items():
+    for key, quantity in QUANTITY_OF_NOISE_KEY.items():
         sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
         known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
         least = float(getattr(AttitudeHold, key))

@@ -17,15 +17,15 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.piecewise import interpolate
 from models.core.signals import Smooth
-from models.core.smoothing import smoothed
-from models.measured.gaps import bridged
+from models.core.smoothing import low_passed
+from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
-from models.measured.signal import HUB, Signal
+from models.measured.signal import HUB_COMPONENTS, Signal
 from models.multibody.cut_kernel import FRAMES, WRENCH
 from models.vehicles.cut_vehicle import CutVehicle
 
-ANGLES = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
-WINDOW, OVERLAP = 4096, 96
+ANGLE_SIGNALS = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
+SPLINE_WINDOW, SPLINE_OVERLAP = 4096, 96
 """Answers in a stretch whose spline is made at once, and samples beside it: what is farther has weights below 1e-30."""
 
 
@@ -33,7 +33,8 @@ WINDOW, OVERLAP = 4096, 96
 class StepGrid:
     """Steps of a run on a recording's clock.
 
-    A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``skip`` samples apart.
+    A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``samples_per_output``
+    samples apart.
     """
 
     step: float
@@ -50,7 +51,7 @@ class StepGrid:
         return max(round(self.period / self.step), 1)
 
     @property
-    def skip(self) -> int:
+    def samples_per_output(self) -> int:
         """Number of samples of the recording from one output sample to the next."""
         return max(round(self.step / self.period), 1)
 
@@ -65,7 +66,7 @@ class StepGrid:
         """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), by linear interpolation."""
         return interpolate(samples, *self._samples_before(count))
 
-    def cubic(self, samples: np.ndarray, count: int) -> np.ndarray:
+    def cubic_rows(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the second of ``samples`` (n, columns), by the cubic through the two
         samples before and the two after each."""
         at, u = self._samples_before(count)
@@ -95,14 +96,14 @@ class Inputs:
         used: dict[tuple[str, str, str], Signal] = {
             (s.quantity, s.component, s.at): s for s in reversed(recording.signals) if not s.check
         }
-        self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB]
-        self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLES]
+        self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB_COMPONENTS]
+        self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLE_SIGNALS]
         self.yaw = used.get(("angular rate", "yaw", vehicle.chassis))
         self._check()
         self._bridges = dict[Signal, tuple[np.ndarray, np.ndarray]]()
         for signal in (*self.hubs, *(self.angles[:2] if enforced else [])):
             if signal is not None:
-                values, gaps, findings = bridged(recording, signal)
+                values, gaps, findings = bridged_signals(recording, signal)
                 self.findings += findings
                 if gaps:
                     lost = np.concatenate([np.arange(gap.first, gap.end) for gap in gaps])
@@ -114,15 +115,15 @@ class Inputs:
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property
-    def used(self) -> tuple[Signal, ...]:
+    def used_signals(self) -> tuple[Signal, ...]:
         """Signals that drive or hold the run."""
         return tuple(signal for signal in (*self.hubs, *self.angles, self.yaw) if signal is not None)
 
     def wrenches(self, first: int, count: int) -> np.ndarray:
         """Hub forces (count, 6 h), N and N m, at samples from ``first`` on; components that were not measured are 0."""
-        return self._block(self.hubs, first, count, 0.0)
+        return self._signal_block(self.hubs, first, count, 0.0)
 
-    def around(self, first: int, count: int) -> np.ndarray:
+    def wrenches_with_neighbours(self, first: int, count: int) -> np.ndarray:
         """``wrenches`` with one more sample before and two after; beyond an end the recording is mirrored in its end
         point.
         """
@@ -134,18 +135,18 @@ class Inputs:
         """Roll, pitch and their rates (n, 4), NaN where not measured; rates that gyros measured are converted to rates
         of the angles.
         """
-        tilt = self._block(self.angles, first, count, np.nan)
+        tilt = self._signal_block(self.angles, first, count, np.nan)
         if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
             known = np.isfinite(tilt[:, 2:])
             roll, pitch, p, q = np.nan_to_num(tilt).T
-            r = np.nan_to_num(self._block([self.yaw], first, count, 0.0)[:, 0])
+            r = np.nan_to_num(self._signal_block([self.yaw], first, count, 0.0)[:, 0])
             rates = np.column_stack(
                 [p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch), q * np.cos(roll) - r * np.sin(roll)]
             )
             tilt[:, 2:] = np.where(known, rates, np.nan)
         return tilt
 
-    def _block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
+    def _signal_block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
         out = np.full((min(count, self.recording.count - first), len(signals)), missing)
         for i, signal in enumerate(signals):
             if signal is not None:
@@ -160,7 +161,7 @@ class Inputs:
         for hub, signals in zip(self.vehicle.hubs, zip(*[iter(self.hubs)] * WRENCH, strict=True), strict=True):
             if signals[2] is None:
                 raise InputError("", "files.channels", None, f"no vertical force is put in at the hub {hub!r}")
-            without = [name for signal, (name, *_) in zip(signals, HUB, strict=True) if signal is None]
+            without = [name for signal, (name, *_) in zip(signals, HUB_COMPONENTS, strict=True) if signal is None]
             if without:
                 text = f"{', '.join(without)} of the hub {hub} were not measured and are taken as 0."
                 self.findings.append(Finding("components", "doubt", hub, text))
@@ -180,8 +181,8 @@ class Prescribed:
         whole = inputs.tilt(0, inputs.recording.count)[:, :2]
         if not np.isfinite(whole).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
-        self.angles, self.grid = smoothed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
-        self._length = WINDOW * grid.skip
+        self.angles, self.grid = low_passed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
+        self._length = SPLINE_WINDOW * grid.samples_per_output
         self._per = int(self._length / grid.part)
 
     def rows(self, first: int, count: int) -> np.ndarray:
@@ -191,8 +192,8 @@ class Prescribed:
             window, offset = divmod(begin + done, self._per)
             taken = min(self._per - offset, count - done)
             stretch = window * self._length
-            start = max(stretch - OVERLAP, 0)
-            samples = self.angles[start : stretch + self._length + OVERLAP + 1]
+            start = max(stretch - SPLINE_OVERLAP, 0)
+            samples = self.angles[start : stretch + self._length + SPLINE_OVERLAP + 1]
             spline = Smooth(samples, period, derivatives=2, degree=5)
             rows = spline.sample((stretch - start) * period, self.grid.step / 2, self._per)
             out[done : done + taken] = rows[offset : offset + taken]

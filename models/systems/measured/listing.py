@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.finding import gathered
-from models.measured.channel import BLOCK, Channel, Source
+from models.core.finding import merged_findings
+from models.measured.channel import SAMPLES_PER_BLOCK, Channel, Source
 from models.measured.formats import open_source
-from models.measured.signal import UNITS, Quantity
-from models.measured.units import quantities
+from models.measured.signal import UNIT_OF_QUANTITY, Quantity
+from models.measured.units import quantities_of_unit
 
 LOOKED_AT = 20
 """Blocks of a group whose values are read for the range: all of a file of twenty minutes at 1 kHz."""
-SCENE = """\
+SCENE_TEMPLATE = """\
 title = "{title}"
 system = "measured"
 study = "recording"
@@ -31,16 +31,16 @@ chassis = "body"
 [[files]]
 file = "{file}"
 channels = ["""
-CORNERS = {
+HUB_PATTERNS = {
     "fl": r"fl|lf|vl|lv|front ?left|left ?front|vorne? ?links|links ?vorne?",
     "fr": r"fr|rf|vr|rv|front ?right|right ?front|vorne? ?rechts|rechts ?vorne?",
     "rl": r"rl|lr|hl|lh|rear ?left|left ?rear|hinten ?links|links ?hinten",
     "rr": r"rr|hr|rh|rear ?right|right ?rear|hinten ?rechts|rechts ?hinten",
 }
 """Hub of r19_free -> what it is called in names."""
-SPRINGS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+SPRING_OF_HUB = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 """Hub -> spring of r19_free."""
-WORDS: dict[Quantity, str] = {
+QUANTITY_PATTERNS: dict[Quantity, str] = {
     "force": r"f[xyz]|force|rad(last|kraft)|kraft|load",
     "moment": r"m[xyz]|moment|torque|drehmoment",
     "acceleration": r"a[xyz]|acc|accel(eration)?|beschl(eunigung)?",
@@ -49,23 +49,25 @@ WORDS: dict[Quantity, str] = {
     "travel": r"travel|federweg|weg|defl(ection)?|disp(lacement)?",
     "strain": r"strain|dms|sg|eps",
 }
-AXES = {
+AXIS_PATTERNS = {
     "x": r"[fmaw]?x|long(itudinal)?|längs",
     "y": r"[fmaw]?y|lat(eral)?|quer",
     "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal",
 }
-PARTS = (
+SUSPENSION_PART_PATTERN = (
     r"strut|damper|shock|absorber|spring|coil ?over|feder|d(ä|ae|a)mpf|sto(ß|ss)d|bellow|balg|top ?mount|domlager|"
     r"bump ?stop|puffer|tie ?rod|track ?rod|push ?rod|pull ?rod|spurstange|druckstrebe|lenker|\barm\b|wishbone|"
     r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
     r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b"
 )
 """Parts of a suspension in names, whose forces are not those of a hub."""
-WHEEL = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
+WHEEL_PATTERN = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
 """A wheel in names."""
-PLAIN = r"f|fw|vert(ical)?|dyn(amic)?|stat(ic)?|total|sum|gesamt|measured|meas|gemessen|signal|ch|chan|channel|kanal"
+UNSPECIFIC_PATTERN = (
+    r"f|fw|vert(ical)?|dyn(amic)?|stat(ic)?|total|sum|gesamt|measured|meas|gemessen|signal|ch|chan|channel|kanal"
+)
 """Words that say nothing of where a force is."""
-TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
+ROTATION_PATTERNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
 
 
 @dataclass(frozen=True)
@@ -86,17 +88,27 @@ class ChannelGuess:
     left_out: str = ""
 
 
-def guess(channel: Channel) -> ChannelGuess | None:
+def guess_channel(channel: Channel) -> ChannelGuess | None:
     """Guess the meaning of a channel; None without any clue. Fields of the guess that remain unknown are empty."""
     words, family = _words_of_name(channel.name), _words_of_name(channel.family)
-    kinds = quantities(channel.unit) or tuple(WORDS)
-    what = next((kind for kind in kinds if _has_words(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
+    kinds = quantities_of_unit(channel.unit) or tuple(QUANTITY_PATTERNS)
+    what = next(
+        (kind for kind in kinds if _has_words(QUANTITY_PATTERNS[kind], words)), kinds[0] if len(kinds) == 1 else None
+    )
     if what is None:
         return None
-    corner = next((hub for text in (words, family) for hub, names in CORNERS.items() if _has_words(names, text)), "")
-    axes = TURNS if what in ("angular rate", "angle") else AXES if what in ("force", "moment", "acceleration") else {}
+    corner = next(
+        (hub for text in (words, family) for hub, names in HUB_PATTERNS.items() if _has_words(names, text)), ""
+    )
+    axes = (
+        ROTATION_PATTERNS
+        if what in ("angular rate", "angle")
+        else AXIS_PATTERNS
+        if what in ("force", "moment", "acceleration")
+        else {}
+    )
     component = next((axis for axis, names in axes.items() if _has_words(names, words)), "")
-    unit = "" if channel.unit.strip() or what == "strain" else UNITS[what]
+    unit = "" if channel.unit.strip() or what == "strain" else UNIT_OF_QUANTITY[what]
     doubts, left_out = [f"the file names no unit: is it {unit}?"] if unit else [], ""
     part = _suspension_words(words, family) if what in ("force", "moment") else ""
     if part:
@@ -110,7 +122,7 @@ def guess(channel: Channel) -> ChannelGuess | None:
         left_out = f"left out: is {strange!r} at the hub?" if strange else ""
     if what == "acceleration":
         doubts.append("where? name the place under [sensors]")
-    places = {"force": corner, "moment": corner, "travel": SPRINGS.get(corner, ""), "strain": channel.name}
+    places = {"force": corner, "moment": corner, "travel": SPRING_OF_HUB.get(corner, ""), "strain": channel.name}
     at = places.get(what, "" if what == "acceleration" else "body")
     return ChannelGuess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
 
@@ -122,13 +134,13 @@ def _words_of_name(name: str) -> str:
 
 def _suspension_words(*texts: str) -> str:
     """First word in the names of a channel and its group that names a part of a suspension; empty if there is none."""
-    matches = (re.search(rf"[^ ]*({PARTS})[^ ]*", text) for text in texts)
+    matches = (re.search(rf"[^ ]*({SUSPENSION_PART_PATTERN})[^ ]*", text) for text in texts)
     return next((match.group() for match in matches if match), "")
 
 
 def _unexpected_word(words: str) -> str:
     """First word of a force channel's name that is not known as a corner, a force, a wheel or a filler word."""
-    for known in (*CORNERS.values(), WORDS["force"], WHEEL, PLAIN):
+    for known in (*HUB_PATTERNS.values(), QUANTITY_PATTERNS["force"], WHEEL_PATTERN, UNSPECIFIC_PATTERN):
         words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
     return next((word for word in words.split() if len(word) > 1), "")
 
@@ -158,18 +170,22 @@ def describe(path: Path) -> str:
     groups = dict[int, list[str]]()
     for channel in source.channels:
         groups.setdefault(channel.group, []).append(channel.name)
-    ranges = {name: text for names in groups.values() for name, text in _ranges(source, names).items()}
+    ranges = {name: text for names in groups.values() for name, text in _range_texts(source, names).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
-    lines += [f"  {finding.weight}: {finding.text}" for finding in gathered(source.noticed)]
+    lines += [f"  {finding.weight}: {finding.text}" for finding in merged_findings(source.noticed)]
     lines += ["", "A scene to begin with, its map guessed from names and units; check every line."]
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
 
 
-def _ranges(source: Source, names: list[str]) -> dict[str, str]:
+def _range_texts(source: Source, names: list[str]) -> dict[str, str]:
     """Text for each channel of a group: rate, number of samples, first and last time, least and largest value."""
     count = next(channel.count for channel in source.channels if channel.name == names[0])
-    firsts = sorted({*range(0, count, max(BLOCK, -(-count // LOOKED_AT))), max(count - BLOCK, 0)}) if count else []
-    blocks = [next(source.blocks(names, BLOCK, first)) for first in firsts]
+    firsts = (
+        sorted({*range(0, count, max(SAMPLES_PER_BLOCK, -(-count // LOOKED_AT))), max(count - SAMPLES_PER_BLOCK, 0)})
+        if count
+        else []
+    )
+    blocks = [next(source.blocks(names, SAMPLES_PER_BLOCK, first)) for first in firsts]
     if not blocks:
         return dict.fromkeys(names, f"{'':>10} {0:>10}")
     steps = np.concatenate([np.diff(block.times) for block in blocks])
@@ -185,14 +201,14 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
 
 def scene_text(source: Source) -> str:
     """A scene for this file as TOML: entries for guessed channels, comments for the others."""
-    rows = [_row(channel.name, guess(channel)) for channel in source.channels]
-    return "\n".join([SCENE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
+    rows = [_map_entry(channel.name, guess_channel(channel)) for channel in source.channels]
+    return "\n".join([SCENE_TEMPLATE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
 
 
-def _row(name: str, guess: ChannelGuess | None) -> str:
+def _map_entry(name: str, guess: ChannelGuess | None) -> str:
     """An entry of the channel map, as a comment where anything is missing or uncertain."""
     if guess is None:
-        return f"  # {{ channel = {_quoted(name)} }},  # not known"
+        return f"  # {{ channel = {_toml_string(name)} }},  # not known"
     free = guess.quantity in ("travel", "strain") or bool(guess.left_out and not guess.at)
     entries = {
         "channel": name,
@@ -201,12 +217,12 @@ def _row(name: str, guess: ChannelGuess | None) -> str:
         "component": guess.component or ("" if free else "?"),
         "unit": guess.unit,
     }
-    text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
+    text = ", ".join(f"{key} = {_toml_string(value)}" for key, value in entries.items() if value)
     told = " ".join(word for word in (guess.doubt, guess.left_out) if word)
     unsure = guess.left_out or "?" in entries.values()
     return f"  {'# ' if unsure else ''}{{ {text} }},{f'  # {told}' if told else ''}"
 
 
-def _quoted(text: str) -> str:
+def _toml_string(text: str) -> str:
     """A text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)

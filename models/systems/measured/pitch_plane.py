@@ -20,27 +20,27 @@ from models.core.time_series import write_time_series
 from models.drift import score
 from models.drift.score import Limits, Verdict, section_forces
 from models.measured import axle_forces
-from models.measured.axle_balance import AXLES, axle_signals, axles
+from models.measured.axle_balance import FORCE_PLACES, axle_signals, axles
 from models.measured.columns import Columns
-from models.measured.gaps import bridged
+from models.measured.gaps import bridged_signals
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome
 from models.systems.measured.sections import SectionChannel
 from models.systems.pitch_plane import trust as drift_trust
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, assemble, build
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
 from models.systems.pitch_plane.trust import Trust
 
-CHASSIS = "chassis"
-STEP = 1e-3
+CHASSIS_NAME = "chassis"
+LONGEST_STEP = 1e-3
 """s, the longest step: the fastest pole of the published vehicle needs one below 2.8 ms."""
-UNSEEN = (
+UNCHECKED_TEXT = (
     "free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
     "would drive it off unseen"
 )
-EFFECTS = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
-SPRINGS = {"f3": "front spring", "f4": "rear spring"}
+EFFECT_OF_HOLD = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
+SPRING_NAMES = {"f3": "front spring", "f4": "rear spring"}
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class PlaneJob:
     @property
     def effect(self) -> str | None:
         """Name of the effect that holds the pitch; None for a free run."""
-        return EFFECTS.get(self.hold.method)
+        return EFFECT_OF_HOLD.get(self.hold.method)
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     scene, said = scene_of(job, folder)
     result = simulate(scene, job.engine, error=error)
     limited = trusted_time(scene, job.hold.force)
-    if limited and job.recording.find("angle", CHASSIS, "pitch"):
-        limited = replace(limited, unchecked="")  # the run is compared with it
+    if limited and job.recording.find("angle", CHASSIS_NAME, "pitch"):
+        limited = replace(limited, unchecked_text="")  # the run is compared with it
     figures = score.figures_of_run(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
@@ -94,7 +94,7 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     )
     if job.effect is None and verdict.word == "accepted":
         verdict = _beside_pitch(job, result, limits or Limits(), verdict)
-    return PlaneRun(result, limited, verdict, _outcome(result, said, folder))
+    return PlaneRun(result, limited, verdict, _section_outcome(result, said, folder))
 
 
 def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
@@ -104,9 +104,9 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     Where forces turn with the vehicle no error grows, but offsets and forces in another frame still drive it off, and
     its longitudinal forces are as wrong as its pitch. In this case a measured pitch must confirm the run.
     """
-    angles = job.recording.find("angle", CHASSIS, "pitch")
+    angles = job.recording.find("angle", CHASSIS_NAME, "pitch")
     if not angles:
-        return Verdict("stabilise", UNSEEN) if _frames(job) != {"inertial"} else verdict
+        return Verdict("stabilise", UNCHECKED_TEXT) if _force_frames(job) != {"inertial"} else verdict
     measured = job.recording.samples(angles[0])
     known = np.flatnonzero(np.isfinite(measured))
     beside = np.interp(result.times, job.recording.period * known, measured[known])
@@ -117,25 +117,25 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
 
 
-def _frames(job: PlaneJob) -> set[str]:
+def _force_frames(job: PlaneJob) -> set[str]:
     """Frames of the forces at both axles."""
-    return {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
+    return {signal.frame for axle in FORCE_PLACES for signal in axle_signals(job.recording, axle)}
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     """A pitch-plane scene of the recording, whose files are written into the folder, and findings on bridged gaps."""
-    period, said, frames = job.recording.period, list[Finding](), _frames(job)
-    forces = {axle: ("N", _axle(job, axle, said)) for axle in AXLES}
+    period, said, frames = job.recording.period, list[Finding](), _force_frames(job)
+    forces = {axle: ("N", _axle(job, axle, said)) for axle in FORCE_PLACES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
     if "inertial" in frames and len(frames) > 1:
         text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
         raise InputError(job.file, "files.channels", None, text)
     fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
-    driving = {"file": "wheel_forces.csv", "interpolation": "smooth", "accept": list(axle_forces.CHECKS)}
+    driving = {"file": "wheel_forces.csv", "interpolation": "smooth", "accept": list(axle_forces.FINDING_NAMES)}
     effects: dict[str, Any] = {"wheel_forces": driving | {"frame": "inertial" if fixed else "body"}}
     if job.effect:
         effects[job.effect] = _prescribed_pitch(job, folder, said)
-    step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
+    step = job.step or period / math.ceil(period / LONGEST_STEP * (1 - 1e-9))
     table = {
         "title": "recording",
         "vehicle": {"parameters": job.parameters},
@@ -154,11 +154,11 @@ def trusted_time(scene: Scene, deviation: float) -> Trust | None:
     """Time for which a scene's run can be trusted when its forces have noise of this standard deviation (N); None where
     the pitch is held to a measured pitch.
     """
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     bounds = drift_trust.predict_trust(assembly)
     if bounds is None or deviation <= 0:
         return bounds
-    noise = drift_trust.noise(assembly, deviation).passes(bounds.angle)
+    noise = drift_trust.noise(assembly, deviation).passing_time(bounds.angle)
     return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 
@@ -166,14 +166,14 @@ def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
     """Vertical force (n,) of an axle with short gaps bridged; InputError for a long gap or a missing wheel."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        whole, left, right = map(repr, AXLES[axle])
+        whole, left, right = map(repr, FORCE_PLACES[axle])
         text = f"the vertical force is needed at {whole}, or at both {left} and {right}"
         raise InputError(job.file, "files.channels", None, text)
     return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
 
 
 def _samples_without_gaps(job: PlaneJob, signal: Signal, all_findings: list[Finding]) -> np.ndarray:
-    values, _, findings = bridged(job.recording, signal)
+    values, _, findings = bridged_signals(job.recording, signal)
     all_findings += findings
     return values
 
@@ -187,25 +187,25 @@ def _prescribed_pitch(job: PlaneJob, folder: Path, findings: list[Finding]) -> d
         ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
     )
     for quantity, name, unit, key, deviation in known if filtered else known[:1]:
-        for signal in [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check][:1]:
+        for signal in [s for s in job.recording.find(quantity, CHASSIS_NAME, "pitch") if not s.check][:1]:
             values = job.recording.samples(signal) if filtered else _samples_without_gaps(job, signal, findings)
             columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:
-        raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS!r}")
+        raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS_NAME!r}")
     write_time_series(folder / "pitch.csv", columns, job.recording.period)
     if not filtered:
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
-    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in AXLES))
+    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in FORCE_PLACES))
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> SectionOutcome:
+def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> SectionOutcome:
     """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
     channels = dict[SectionChannel, np.ndarray]()
-    for name, spring in SPRINGS.items():
+    for name, spring in SPRING_NAMES.items():
         for axis, way in (("x", "forward"), ("z", "upward")):
-            text = f"on the {CHASSIS} in its axes, {way} positive"
+            text = f"on the {CHASSIS_NAME} in its axes, {way} positive"
             channels[SectionChannel(f"{spring} F{axis}", "N", text, spring, "force", spring, axis)] = forces[
                 f"{name}{axis}"
             ]
@@ -214,7 +214,9 @@ def _outcome(result: Result, findings: tuple[Finding, ...], folder: Path) -> Sec
         (" rate", "angular rate", "rad/s", "pitch_rate"),
     )
     for suffix, quantity, unit, name in pitch:
-        answer = SectionChannel(f"{CHASSIS} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS, "pitch")
+        answer = SectionChannel(
+            f"{CHASSIS_NAME} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS_NAME, "pitch"
+        )
         channels[answer] = -result[name]
     columns = Columns(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
     columns.write(0, np.column_stack(list(channels.values())))

@@ -5,19 +5,19 @@ from collections.abc import Sequence
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.finding import lines as told_of
-from models.core.scene_effects import lines as effect_lines
+from models.core.finding import finding_lines as told_of
+from models.core.scene_effects import effect_lines as effect_lines
 from models.measured.channel import Source
 from models.measured.formats import open_source
 from models.measured.signal import Signal
 from models.systems.measured.assumptions import assumptions
-from models.systems.measured.channel_map import signals
+from models.systems.measured.channel_map import mapped_signals
 from models.systems.measured.scene import MeasuredScene, Rig
 from models.systems.measured.virtual import check as check_virtual
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 
-MISSING = "no vertical force is mapped at {}: without it the vehicle falls"
+MISSING_FORCE_TEXT = "no vertical force is mapped at {}: without it the vehicle falls"
 
 
 def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
@@ -27,23 +27,23 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
     rig = scene.rig()
     _check_names(scene, rig)
     if scene.virtual is None:
-        mapped(scene, opened(scene), rig)
+        signals_of_files(scene, opened_files(scene), rig)
     elif rig.vehicle is not None:
         check_virtual(rig.vehicle, scene.virtual, scene.file)
 
 
-def opened(scene: MeasuredScene) -> tuple[Source, ...]:
+def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
     """The scene's files, opened; raises InputError."""
     return tuple(open_source(scene.path(file.file, f"files.{i}.file")) for i, file in enumerate(scene.files))
 
 
-def mapped(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
+def signals_of_files(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
     """Signals of all files. InputError also where a wheel has no vertical force, or the stabiliser no angles."""
-    every, method = signals(scene, sources, rig.places), scene.stabilise.method
+    every, method = mapped_signals(scene, sources, rig.places), scene.stabilise.method
     driving = {(s.quantity, s.at, s.component) for s in every if not s.check}
     for hub in rig.hubs if rig.vehicle else ():
         if ("force", hub, "z") not in driving:
-            raise InputError(scene.file, "files", None, MISSING.format(repr(hub)))
+            raise InputError(scene.file, "files", None, MISSING_FORCE_TEXT.format(repr(hub)))
     wanted = {"none": (), "prescribed": ("angle",), "kalman": ("angle", "angular rate")}[method]
     for quantity in wanted:
         for axis in rig.angles:
@@ -88,7 +88,7 @@ def describe(scene: MeasuredScene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
     virtual, stabilised, wanted = scene.virtual, scene.stabilise, scene.hand_on
     if virtual is None:
-        lines += _files(scene, rig)
+        lines += _file_lines(scene, rig)
     else:
         road = f"{virtual.duration:g} s on ISO 8608 class {virtual.road.iso8608} at {virtual.road.speed:g} m/s"
         told = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
@@ -106,10 +106,10 @@ def describe(scene: MeasuredScene) -> str:
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
 
-def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
+def _file_lines(scene: MeasuredScene, rig: Rig) -> list[str]:
     """Lines on every file and its channels, as these will be read."""
-    sources, lines = opened(scene), list[str]()
-    every = mapped(scene, sources, rig)
+    sources, lines = opened_files(scene), list[str]()
+    every = signals_of_files(scene, sources, rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
         lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))

@@ -16,42 +16,42 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import not_estimated, stated
+from models.core.discretisation import not_estimated, with_stated_errors
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.result import Result
 from models.core.systems import load
 from models.drift.score import Verdict
-from models.fatigue.counting import Counted, count
-from models.measured.checks import findings
+from models.fatigue.counting import CountedLoad, counted_load
+from models.measured.checks import findings_of_all_checks
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
-from models.measured.checks.weight import moments
+from models.measured.checks.weight import mean_hub_moments
 from models.measured.recording import Progress, Recording, no_progress
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.assumptions import assumptions
-from models.systems.measured.clock import record
+from models.systems.measured.clock import record_on_clock
 from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
-from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
-from models.systems.measured.holds import FREE, NOISE, holds_of
+from models.systems.measured.hand_on import FILE_STEM, forces, hand_on, labelled_result
+from models.systems.measured.holds import FREE_RUN, QUANTITY_OF_NOISE_KEY, holds_of
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
-from models.systems.measured.plan import mapped, opened
+from models.systems.measured.plan import opened_files, signals_of_files
 from models.systems.measured.scene import MeasuredScene, Rig
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import check as check_run
 from models.systems.measured.section_run import run as march
-from models.systems.measured.sections import SectionChannel, Sections, points
-from models.systems.measured.trust import Drift, Level, drift
-from models.systems.measured.verdict import Compared, checks, compare, filter_doubts, judge
+from models.systems.measured.sections import SectionChannel, Sections, accelerometer_points
+from models.systems.measured.trust import Drift, Level, predicted_drift
+from models.systems.measured.verdict import ChannelComparison, channels_to_compare, compare, filter_doubts, judge
 from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
-from models.systems.pitch_plane.trust import ANGLE, Trust
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
 from models.vehicles.cut_vehicle import CutVehicle
 
-WORK = "work"
+WORK_FOLDER = "work"
 """Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
 
 
@@ -61,7 +61,7 @@ class Examination:
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
     seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
-    temporary : where all of it lies, None in a user's folder.
+    temporary_folder : where all of it lies, None in a user's folder.
     """
 
     scene: MeasuredScene
@@ -76,40 +76,40 @@ class Examination:
     runs: dict[str, SectionOutcome] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
-    compared: tuple[Compared, ...] = ()
+    channel_comparisons: tuple[ChannelComparison, ...] = ()
     plane: Result | None = None
-    counted: dict[SectionChannel, Counted] = field(default_factory=dict)
-    handed: tuple[Path, ...] = ()
+    counted: dict[SectionChannel, CountedLoad] = field(default_factory=dict)
+    handed_files: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
-    temporary: "TemporaryDirectory[str] | None" = None
+    temporary_folder: "TemporaryDirectory[str] | None" = None
 
     @cached_property
     def evidence(self) -> Evidence:
         """The evidence that the checks of the recording examine."""
-        stated = {quantity: getattr(self.scene.noise, key) for key, quantity in NOISE.items()}
+        stated = {quantity: getattr(self.scene.noise, key) for key, quantity in QUANTITY_OF_NOISE_KEY.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
 
     @property
-    def stopped(self) -> bool:
+    def is_stopped(self) -> bool:
         """Whether the recording has an error because of which no run is made."""
         return any(finding.weight == "error" for finding in self.findings)
 
     @property
-    def chosen(self) -> str:
+    def chosen_run(self) -> str:
         """Name of the run that is handed on: with the stabiliser, or free where the scene names none."""
         return [*self.holds][-1]
 
     @property
     def outcome(self) -> SectionOutcome | None:
         """The outcome of the run that is handed on; None where no run was made."""
-        return self.runs.get(self.chosen)
+        return self.runs.get(self.chosen_run)
 
     def put_in(self, signal: Signal) -> bool:
         """Whether a signal drives or holds the vehicle; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
-        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
+        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
 
     def forces(self, outcome: SectionOutcome) -> list[SectionChannel]:
         """Section forces and moments of a run at the sections that the scene names, or at all sections if it names
@@ -126,7 +126,7 @@ class Examination:
         settings = self.engine, self.holds[name], self.scene.run.step, self.scene.file
         if vehicle is None:
             return PlaneJob(recording, self.rig.name, *settings)
-        sections = Sections(vehicle, points=points(vehicle, recording.signals, self.scene.places))
+        sections = Sections(vehicle, points=accelerometer_points(vehicle, recording.signals, self.scene.places))
         return SectionRun(vehicle, recording, sections, *settings)
 
     def march(
@@ -139,9 +139,9 @@ class Examination:
         if isinstance(job, SectionRun):
             return march(job, folder, progress)
         shutil.rmtree(folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
-        run = run_plane(job, folder, self.scene.limits, error and name == self.chosen)
+        run = run_plane(job, folder, self.scene.limits, error and name == self.chosen_run)
         self.verdicts[name], self.plane = run.verdict, run.result
-        if name == FREE and run.trust is not None:
+        if name == FREE_RUN and run.trust is not None:
             self.trust = (("pitch", run.trust),)
         return run.outcome
 
@@ -168,23 +168,23 @@ def run(
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
-    exam = _begun(scene, engine or scene.run.engine, folder, progress, error)
-    exam.temporary = temporary
+    exam = _begun_examination(scene, engine or scene.run.engine, folder, progress, error)
+    exam.temporary_folder = temporary
     if whole_run:
-        _examined(exam, folder, progress, error)
+        _examine(exam, folder, progress, error)
     else:
         begun = time.process_time()
-        exam.runs[exam.chosen] = exam.march(exam.chosen, folder / WORK / exam.chosen, error=error)
+        exam.runs[exam.chosen_run] = exam.march(exam.chosen_run, folder / WORK_FOLDER / exam.chosen_run, error=error)
         exam.seconds["march"] = time.process_time() - begun
-    labelled = _judged_by_assumptions(_labelled(scene, exam, folder), exam)
+    labelled = _judged_by_assumptions(_labelled_result(scene, exam, folder), exam)
     try:
-        return _with_error(labelled, exam, folder / WORK / "error") if error else labelled
+        return _with_error(labelled, exam, folder / WORK_FOLDER / "error") if error else labelled
     except RunFailed as failure:
         if not whole_run:
             raise
-        exam.failed[exam.chosen] = str(failure)
-        exam.verdicts[exam.chosen] = Verdict("rejected", failure.reason)
-        labelled.data.attrs |= _endings(exam)
+        exam.failed[exam.chosen_run] = str(failure)
+        exam.verdicts[exam.chosen_run] = Verdict("rejected", failure.reason)
+        labelled.data.attrs |= _endings_of_runs(exam)
         return labelled
 
 
@@ -204,25 +204,25 @@ def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
 
 def _with_error(run: Result, examination: Examination, work: Path) -> Result:
     """The result with the error of the steps of the run that is handed on."""
-    job, outcome = examination.job(examination.chosen), examination.outcome
+    job, outcome = examination.job(examination.chosen_run), examination.outcome
     if outcome is None or not isinstance(job, SectionRun):
         return run
-    if examination.chosen in examination.failed:
-        return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen]}")
+    if examination.chosen_run in examination.failed:
+        return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen_run]}")
     before = examination.virtual.errors if examination.virtual is not None else {}
     try:
         told = errors_of_steps(job, outcome, before, work)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"a part of it, in half the step, did not end: {failure}")
-    return stated(run, told, "a part from the middle, in its steps and in half of them")
+    return with_stated_errors(run, told, "a part from the middle, in its steps and in half of them")
 
 
-def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
+def _begun_examination(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
     """Start an examination: bring the recording onto one clock, from the scene's files or from those of a virtual
     measurement.
     """
     rig, virtual, seconds, begun = scene.rig(), None, dict[str, float](), time.perf_counter()
-    (folder / WORK).mkdir(parents=True, exist_ok=True)
+    (folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
         progress("virtual measurement", 0.0)
         virtual = virtual_measurement(rig.vehicle, scene.virtual, engine, scene.file, error)
@@ -230,36 +230,36 @@ def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, 
             write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
         scene = load(folder / "scene.toml")
         seconds["virtual measurement"] = time.perf_counter() - begun
-    recording = read_files(scene, folder / WORK, lambda text, part: progress(text, 0.2 * part))
+    recording = read_files(scene, folder / WORK_FOLDER, lambda text, part: progress(text, 0.2 * part))
     exam = Examination(scene, rig, engine, recording, virtual, holds_of(scene, recording), seconds=seconds)
-    _lap(exam, "reading", begun)
+    _record_seconds(exam, "reading", begun)
     return exam
 
 
 def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progress) -> Recording:
     """The files of a scene as a recording on one clock, with columns in a folder; InputError for unusable files."""
-    sources, rig = opened(scene), scene.rig()
-    return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
+    sources, rig = opened_files(scene), scene.rig()
+    return record_on_clock(scene, sources, signals_of_files(scene, sources, rig), rig.hubs, folder, progress)
 
 
-def _lap(examination: Examination, stage: str, begun: float) -> None:
+def _record_seconds(examination: Examination, stage: str, begun: float) -> None:
     """Record the seconds of a stage that has ended: time since ``begun`` less that of the earlier stages."""
     examination.seconds[stage] = time.perf_counter() - begun - sum(examination.seconds.values())
 
 
-def _examined(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
+def _examine(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
     """Check the recording, predict its drift, run it, judge the runs and hand on forces, as far as the recording can be
     used.
     """
-    lap = partial(_lap, examination, begun=time.perf_counter() - sum(examination.seconds.values()))
+    lap = partial(_record_seconds, examination, begun=time.perf_counter() - sum(examination.seconds.values()))
     progress("checks", 0.2)
-    examination.findings = findings(examination.evidence)
+    examination.findings = findings_of_all_checks(examination.evidence)
     lap("checks")
-    if examination.stopped:
+    if examination.is_stopped:
         return
     if examination.rig.vehicle is not None:
-        _predicted(examination, examination.rig.vehicle)
-    _run(examination, folder / WORK, progress, error)
+        _predict_drift(examination, examination.rig.vehicle)
+    _run(examination, folder / WORK_FOLDER, progress, error)
     if examination.rig.vehicle is not None:
         _with_verdicts(examination)
     lap("runs")
@@ -270,7 +270,7 @@ def _examined(examination: Examination, folder: Path, progress: Progress, error:
         )
         examination.findings += filter_doubts(examination.outcome)
     progress("what the findings do", 0.9)
-    _with_consequences(examination, folder / WORK)
+    _with_consequences(examination, folder / WORK_FOLDER)
     lap("what the findings do")
     if examination.outcome is not None:
         progress("files", 0.95)
@@ -278,25 +278,25 @@ def _examined(examination: Examination, folder: Path, progress: Progress, error:
         lap("files")
 
 
-def _predicted(examination: Examination, vehicle: CutVehicle) -> None:
+def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
     """Predict the drift of the free run, which begins level and at rest: from noise, from moments that the motion
     contradicts, and from the measured initial tilt and rates.
     """
-    recording, free = examination.recording, examination.holds[FREE]
+    recording, free = examination.recording, examination.holds[FREE_RUN]
     tilt, rate = (
         [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
         for what in ("angle", "angular rate")
     )
-    couple = moments(examination.evidence)  # that the motion does not bear out, at the first hub
+    couple = mean_hub_moments(examination.evidence)  # that the motion does not bear out, at the first hub
     bias = np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(vehicle.hubs) - 5)]) if couple.any() else None
     frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
     level = Level(free.force, free.moment, bias, tilt, rate)
-    examination.drift = drift(vehicle, level, recording.period, recording.duration, frame)
-    lacking = examination.evidence.lacking
+    examination.drift = predicted_drift(vehicle, level, recording.period, recording.duration, frame)
+    lacking = examination.evidence.missing_data_text
     rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
     examination.trust = tuple(
-        (what, replace(examination.drift.trust(angle), unchecked=rest))
-        for what, angle in (("section forces", None), ("motion", ANGLE))
+        (what, replace(examination.drift.trust(angle), unchecked_text=rest))
+        for what, angle in (("section forces", None), ("motion", UNTRUSTED_PITCH))
     )
 
 
@@ -351,17 +351,17 @@ def _with_verdicts(examination: Examination) -> None:
     for name, outcome in examination.runs.items():
         job = examination.job(name)
         assert isinstance(job, SectionRun)
-        beside = tuple(compare(recording, outcome, *pair, slopes) for pair in checks(job))
+        beside = tuple(compare(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
         examination.verdicts[name] = judge(
             job,
             outcome,
             examination.scene.limits,
-            examination.drift.passes(examination.drift.angle) or recording.duration,
+            examination.drift.passing_time(examination.drift.angle) or recording.duration,
             [compared for compared in beside if compared.signal.check],
             {s.name: noise(recording, s) for s in recording.signals if s.check},
         )
-        if name == examination.chosen:
-            examination.compared = beside
+        if name == examination.chosen_run:
+            examination.channel_comparisons = beside
 
 
 def _with_consequences(examination: Examination, work: Path) -> None:
@@ -369,9 +369,9 @@ def _with_consequences(examination: Examination, work: Path) -> None:
     used, or the free run where that failed.
     """
     name = (
-        examination.chosen
-        if examination.chosen in examination.runs and examination.chosen not in examination.failed
-        else FREE
+        examination.chosen_run
+        if examination.chosen_run in examination.runs and examination.chosen_run not in examination.failed
+        else FREE_RUN
     )
     if name in examination.runs:
         rerun, answers = partial(examination.rerun, name), examination.forces(examination.runs[name])
@@ -389,16 +389,18 @@ def _save_section_forces(examination: Examination, outcome: SectionOutcome, fold
     an interrupted run are kept.
     """
     answers, wanted = examination.forces(outcome), examination.scene.hand_on
-    examination.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
-    examination.handed = tuple(folder / f"{FILES}.{form}" for form in wanted.formats)
-    formats = [path.suffix[1:] for path in examination.handed if not path.exists()]
-    comment = f"{examination.scene.title}; computed from wheel forces, {examination.chosen} run, {examination.engine}"
+    examination.counted = {answer: counted_load(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
+    examination.handed_files = tuple(folder / f"{FILE_STEM}.{form}" for form in wanted.formats)
+    formats = [path.suffix[1:] for path in examination.handed_files if not path.exists()]
+    comment = (
+        f"{examination.scene.title}; computed from wheel forces, {examination.chosen_run} run, {examination.engine}"
+    )
     hand_on(outcome, folder, formats, answers, examination.recording.start, comment)
 
 
-def _labelled(scene: MeasuredScene, examination: Examination, folder: Path) -> Result:
+def _labelled_result(scene: MeasuredScene, examination: Examination, folder: Path) -> Result:
     """The result of a scene, whose detail is its examination."""
-    return labelled(
+    return labelled_result(
         scene,
         examination.outcome,
         examination.counted,
@@ -407,12 +409,12 @@ def _labelled(scene: MeasuredScene, examination: Examination, folder: Path) -> R
         seconds=examination.seconds.get("march", 0.0),
         doubts=[finding.text for finding in examination.findings if finding.weight != "note"],
         detail=examination,
-        run=examination.chosen,
-        **_endings(examination),
+        run=examination.chosen_run,
+        **_endings_of_runs(examination),
     )
 
 
-def _endings(examination: Examination) -> dict[str, str]:
+def _endings_of_runs(examination: Examination) -> dict[str, str]:
     """Verdicts on the runs and reasons of failures, as attributes of the result."""
     verdicts = {name: [verdict.word, verdict.reason] for name, verdict in examination.verdicts.items()}
     return {"verdicts": json.dumps(verdicts), "failed": json.dumps(examination.failed)}

@@ -10,14 +10,14 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.scene_effects import with_own
 from models.core.scene_file import SceneFile, checked
-from models.core.strict import Query, Strict, accepted, quantity
+from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.drift.score import Limits
-from models.measured.axle_balance import AXLES
+from models.measured.axle_balance import FORCE_PLACES
 from models.measured.signal import Frame, Places, Quantity, TransducerPlace
 from models.own_model.scene_vehicle import scene_vehicle
-from models.systems.measured.pitch_plane import CHASSIS, SPRINGS
-from models.systems.measured.sections import names
-from models.systems.measured.verdict import LIMITS
+from models.systems.measured.pitch_plane import CHASSIS_NAME, SPRING_NAMES
+from models.systems.measured.sections import section_names
+from models.systems.measured.verdict import RUN_LIMITS
 from models.systems.measured.virtual import VirtualTable
 from models.systems.pitch_plane.scene import parameter_set
 from models.vehicles.cut_vehicle import CutVehicle, cut
@@ -56,7 +56,7 @@ class Vehicle(Strict):
     )
     chassis: str = Field(default="body", description="the body with all six freedoms")
     parameters: str | None = Field(default=None, description="of the pitch-plane vehicle: a set, or a TOML file")
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class MappedChannel(Strict):
@@ -149,7 +149,7 @@ class MeasuredScene(SceneFile):
     noise: Deviations = Deviations()
     stabilise: Stabilise = Stabilise()
     run: Run = Run()
-    limits: Limits = Field(default=LIMITS, description="of the verdict")
+    limits: Limits = Field(default=RUN_LIMITS, description="of the verdict")
     hand_on: HandOn = HandOn()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
@@ -159,13 +159,13 @@ class MeasuredScene(SceneFile):
         """
         given_vehicle = self.vehicle
         if given_vehicle.file is None:
-            hubs, springs = tuple(hub for axle in AXLES.values() for hub in axle), tuple(SPRINGS.values())
-            places = Places(hubs, (CHASSIS,), springs)
-            return Rig(str(given_vehicle.parameters), CHASSIS, places, springs, ("pitch",), None)
+            hubs, springs = tuple(hub for axle in FORCE_PLACES.values() for hub in axle), tuple(SPRING_NAMES.values())
+            places = Places(hubs, (CHASSIS_NAME,), springs)
+            return Rig(str(given_vehicle.parameters), CHASSIS_NAME, places, springs, ("pitch",), None)
         vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
         bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
         places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
-        return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
+        return Rig(vehicle.tree.name, vehicle.chassis, places, section_names(vehicle), ("roll", "pitch"), vehicle)
 
     @property
     def places(self) -> dict[str, TransducerPlace]:

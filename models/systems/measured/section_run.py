@@ -32,11 +32,11 @@ from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import TiltFilter
 
-BLOCK = 60.0
+CHECKPOINT_INTERVAL = 60.0
 """s of recording between two checkpoints."""
-DAMPING = 0.7
+PULL_DAMPING = 0.7
 """Of the moment towards the filter's estimate, of the critical one."""
-STIFF = 0.1
+STIFFEST_PULL = 0.1
 """Bandwidth of the pull by the rate of the steps: a stiffer one outruns Runge-Kutta 4."""
 Progress = Callable[[float, float], None]
 
@@ -81,22 +81,23 @@ class SectionRun:
     @property
     def count(self) -> int:
         """Number of output samples in the whole run."""
-        return (self.recording.count - 1) // self.grid.skip + 1
+        return (self.recording.count - 1) // self.grid.samples_per_output + 1
 
 
 @dataclass(frozen=True)
 class SectionOutcome:
-    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``surprise`` and ``doubts`` of
-    the filter about its measurements, NaN and none without one; counts of steps, force calls and states.
+    """Output channels of a run, ``period`` (s) apart, of which ``done`` samples exist; ``normalised_innovation`` and
+    ``filter_objections`` of the filter about its measurements, NaN and none without one; counts of steps, force calls
+    and states.
     """
 
     columns: Columns
     answers: tuple[SectionChannel, ...]
     period: float
     done: int
-    surprise: float
+    normalised_innovation: float
     findings: tuple[Finding, ...]
-    doubts: tuple[str, ...] = ()
+    filter_objections: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
 
     def samples(self, answer: SectionChannel | str) -> np.ndarray:
@@ -138,7 +139,7 @@ class Checkpoint:
         write_whole(self.path, buffer.getvalue())
 
 
-def digest(*parts: object) -> str:
+def digest_of(*parts: object) -> str:
     """Digest of objects: arrays count by their bytes, other objects by their ``repr``."""
     total = hashlib.blake2b(digest_size=16)
     for part in parts:
@@ -157,8 +158,8 @@ def check(job: SectionRun) -> None:
     if job.count < 2:
         raise InputError(job.file, "files", None, f"the recording has {job.recording.count} samples: nothing to run")
     check_step(job.engine, job.vehicle, grid.step, grid.step * grid.every)
-    if hold.method == "kalman" and hold.bandwidth * grid.step > STIFF:
-        limit = f"must be at most {STIFF:g} of the rate of the run's steps, {STIFF / grid.step:g} Hz"
+    if hold.method == "kalman" and hold.bandwidth * grid.step > STIFFEST_PULL:
+        limit = f"must be at most {STIFFEST_PULL:g} of the rate of the run's steps, {STIFFEST_PULL / grid.step:g} Hz"
         raise InputError(job.file, "stabilise.bandwidth", hold.bandwidth, limit)
     used = [signal for signal in job.recording.signals if not signal.check and signal.at == job.vehicle.chassis]
     if hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
@@ -166,7 +167,9 @@ def check(job: SectionRun) -> None:
         raise InputError(job.file, "stabilise.method", hold.method, needed)
 
 
-def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = BLOCK) -> SectionOutcome:
+def run(
+    job: SectionRun, folder: Path, progress: Progress = no_progress, block: float = CHECKPOINT_INTERVAL
+) -> SectionOutcome:
     """Run a recording, or the part of it that ``folder`` lacks; ``progress`` is called with the simulated and the total
     seconds.
 
@@ -175,7 +178,7 @@ def run(job: SectionRun, folder: Path, progress: Progress = no_progress, block: 
     """
     check(job)
     march = _March(job, folder, max(round(block / (job.grid.step * job.grid.every)), 1))
-    period = job.recording.period * job.grid.skip
+    period = job.recording.period * job.grid.samples_per_output
     progress(march.done * period, job.recording.duration)
     while march.done < job.count:
         march.advance()
@@ -210,11 +213,11 @@ class _March:
         return SectionOutcome(
             self.columns,
             self.job.sections.answers,
-            self.grid.period * self.grid.skip,
+            self.grid.period * self.grid.samples_per_output,
             self.done,
-            self.filter.surprise if self.filter else math.nan,
+            self.filter.normalised_innovation if self.filter else math.nan,
             tuple(self.inputs.findings),
-            self.filter.doubts() if self.filter else (),
+            self.filter.objections() if self.filter else (),
             {"steps": steps, "force calls": 4 * steps, "states": 2 * self.job.vehicle.size},
         )
 
@@ -222,7 +225,7 @@ class _March:
         """March a block and save it; RunFailed carries the outcome so far."""
         grid, last = self.grid, self.job.count - 1
         answers = min(self.length, max(last - self.done, 1))
-        hub_inputs = self._hub_inputs(self.done * grid.skip, answers * grid.every)
+        hub_inputs = self._hub_inputs(self.done * grid.samples_per_output, answers * grid.every)
         model = build(self.job.engine, self.job.vehicle, hub_inputs, grid.step, answers * grid.every * grid.step)
         states, failure = self._marched(model)
         ends = self.done + answers >= last
@@ -238,7 +241,7 @@ class _March:
         """States of a block until its end or until the vehicle topples, and in the latter case the failure with its
         time.
         """
-        began, steps = self.done * self.grid.period * self.grid.skip, model.steps
+        began, steps = self.done * self.grid.period * self.grid.samples_per_output, model.steps
         try:
             states = model.marched(*np.split(self.state, 2)).states
         except RunFailed:
@@ -277,8 +280,8 @@ class _March:
         """
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
-        wrenches = self.inputs.around(first, used + 1)
-        free = HubInputs(grid.cubic(wrenches, rows), self.inputs.frame)
+        wrenches = self.inputs.wrenches_with_neighbours(first, used + 1)
+        free = HubInputs(grid.cubic_rows(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
             return replace(free, guide=self.prescribed.rows(first, rows))
         if self.filter is None:
@@ -286,7 +289,12 @@ class _March:
         tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
         guide = np.hstack([grid.rows(tilt, rows), np.zeros((rows, 2))])
         corner, (roll, pitch, _) = 2 * math.pi * self.job.hold.bandwidth, np.diag(rigid(self.job.vehicle).inertia)
-        pull = (roll * corner**2, 2 * DAMPING * roll * corner, pitch * corner**2, 2 * DAMPING * pitch * corner)
+        pull = (
+            roll * corner**2,
+            2 * PULL_DAMPING * roll * corner,
+            pitch * corner**2,
+            2 * PULL_DAMPING * pitch * corner,
+        )
         return replace(free, guide=guide, pull=pull)
 
     def _start(self) -> np.ndarray:
@@ -318,15 +326,15 @@ def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))
-    samples = digest(job.recording.period, job.recording.count)
-    for signal in inputs.used:
-        samples = digest(samples, signal, job.recording.samples(signal))
+    samples = digest_of(job.recording.period, job.recording.count)
+    for signal in inputs.used_signals:
+        samples = digest_of(samples, signal, job.recording.samples(signal))
     return {
-        "vehicle": digest(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
+        "vehicle": digest_of(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
         "recording": samples,
         "stabiliser": repr(job.hold),
         "engine": f"{job.engine} {version(library)}",
         "step": repr(job.grid.step),
-        "list of sections": digest(job.sections.answers, job.sections.frame),
+        "list of sections": digest_of(job.sections.answers, job.sections.frame),
         "version": f"{version('twinrig')} {sources}",
     }

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.signal import HUB, Quantity, Signal, TransducerPlace
+from models.measured.signal import HUB_COMPONENTS, Quantity, Signal, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, section_answers
 from models.multibody.cut_table import Joints, joints
 from models.vehicles.cut_vehicle import CutVehicle
 
-MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
+MOTION_CHANNELS: tuple[tuple[str, Quantity | None, str, str], ...] = (
     ("x", None, "", "m"),
     ("y", None, "", "m"),
     ("z", None, "", "m"),
@@ -82,10 +82,10 @@ class Sections:
 
     def __post_init__(self) -> None:
         if self.wanted is not None:
-            known = names(self.vehicle)
+            known = section_names(self.vehicle)
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
-        sliding, kept = _sliding(self.vehicle, self.frame), list[tuple[int, SectionChannel]]()
+        sliding, kept = _zero_components(self.vehicle, self.frame), list[tuple[int, SectionChannel]]()
         for column, answer in enumerate(_kernel_columns(self.vehicle, self.frame, self.points)):
             asked = self.wanted is None or answer.section in ("", *self.wanted)
             if asked and answer.name not in sliding:
@@ -98,7 +98,7 @@ class Sections:
             for p in self.points
         ]
         points = np.array(rows, float).reshape(len(rows), 5)
-        object.__setattr__(self, "_places", FeltPlaces(*_guides(self.vehicle, joined), points))
+        object.__setattr__(self, "_places", FeltPlaces(*_guide_arrays(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, stride: int) -> np.ndarray:
         """Values (n, answers) of the channels at states (n, 2 c), ``stride`` half steps apart; ``numbers`` as in
@@ -111,13 +111,13 @@ class Sections:
         return out[:, self.columns]
 
 
-def names(vehicle: CutVehicle) -> tuple[str, ...]:
+def section_names(vehicle: CutVehicle) -> tuple[str, ...]:
     """Names of all sections at which forces can be requested."""
-    guides = tuple(f"{name} guide" for name in guided(vehicle))
+    guides = tuple(f"{name} guide" for name in guided_bodies(vehicle))
     return (*(element.name for element in vehicle.elements), *guides, *(f"{hub} hub" for hub in vehicle.hubs))
 
 
-def guided(vehicle: CutVehicle) -> tuple[str, ...]:
+def guided_bodies(vehicle: CutVehicle) -> tuple[str, ...]:
     """Names of the bodies that are guided by the chassis or by another body."""
     return tuple(body.name for body in vehicle.uncut.bodies if body.name != vehicle.chassis)
 
@@ -138,17 +138,17 @@ def _kernel_columns(
         unit = "m" if e.unit == "N" else "rad"
         text = "from the design position, compression positive"
         yield SectionChannel(f"{e.name} travel", unit, text, e.name, "travel", e.name)
-    for name, quantity, axis, unit in MOTION:
+    for name, quantity, axis, unit in MOTION_CHANNELS:
         text = "of the chassis, x forward, y left, z up"
         yield SectionChannel(f"{chassis} {name}", unit, text, "", quantity, chassis if quantity else "", axis)
     for name in ("roll", "pitch"):
         yield SectionChannel(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
-    for name in guided(vehicle):
-        for axis, _, _, unit in HUB:
+    for name in guided_bodies(vehicle):
+        for axis, _, _, unit in HUB_COMPONENTS:
             text = f"on {name} from what carries it, axes of {about or name}"
             yield SectionChannel(f"{name} guide {axis}", unit, text, f"{name} guide")
     for hub, tyre in zip(vehicle.hubs, vehicle.uncut.tyres, strict=True):
-        for axis, quantity, component, unit in HUB:
+        for axis, quantity, component, unit in HUB_COMPONENTS:
             text = f"on the hub from outside, axes of {about or tyre.body}"
             yield SectionChannel(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
     for p in points:
@@ -158,10 +158,10 @@ def _kernel_columns(
         )
 
 
-def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
+def _zero_components(vehicle: CutVehicle, frame: str) -> set[str]:
     """Names of the guides' force components that are zero, as they act along the guide's free direction."""
     sliding = set[str]()
-    for name in guided(vehicle):
+    for name in guided_bodies(vehicle):
         body = vehicle.uncut.body(name)
         turns = any(freedom.startswith("r") for freedom in body.freedoms)
         if body.parent == vehicle.chassis and (frame == "body" or not turns):
@@ -169,7 +169,7 @@ def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
     return sliding
 
 
-def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
+def _guide_arrays(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
     """For every guided body its last joint (g,), and which bodies, hubs and elements act behind that joint (g, b + h +
     3 e), in the kernel's format.
     """
@@ -181,12 +181,12 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
     def behind(name: str | None, guide: str) -> bool:
         return name is not None and (name == guide or behind(parents[name], guide))
 
-    last = np.array([joined.last[name] for name in guided(vehicle)], np.int64)
-    rows = [[float(behind(owner, name)) for owner in owners] for name in guided(vehicle)]
+    last = np.array([joined.last[name] for name in guided_bodies(vehicle)], np.int64)
+    rows = [[float(behind(owner, name)) for owner in owners] for name in guided_bodies(vehicle)]
     return last, np.array(rows).reshape(len(last), len(owners))
 
 
-def points(
+def accelerometer_points(
     vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, TransducerPlace]
 ) -> tuple[AccelerometerPoint, ...]:
     """Points at which accelerations are measured: sensors, which ``places`` lists, and centres of bodies."""

@@ -12,7 +12,7 @@ cosh(sqrt(A) t) of itself, a rate G of itself.
 
 Forces that turn with the vehicle do not feel it: gravity acts on all bodies alike, and the section forces of such a
 run are right whatever its tilt is. What ends its trust for them is tumbling, when its angles lose their meaning. Where
-forces keep their directions an error of ``ANGLE`` turns as much of every force into another axis.
+forces keep their directions an error of ``UNTRUSTED_PITCH`` turns as much of every force into another axis.
 """
 
 from collections.abc import Sequence
@@ -23,10 +23,10 @@ import numpy as np
 
 from models.engines.cut_vehicle import UPRIGHT
 from models.multibody.cut_kernel import WRENCH
-from models.systems.pitch_plane.trust import ANGLE, Trust
+from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, Trust
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, Rigid, rigid
 
-POINTS = 2000
+SUMMED_TIMES = 2000
 """Times at which the laws are summed."""
 
 
@@ -53,25 +53,26 @@ class Level:
 class Drift:
     """Drift of a free run that the errors of its measurement cause.
 
-    means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
-    deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
+    mean_errors : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) :
+    standard deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
     """
 
     times: np.ndarray
-    means: dict[str, np.ndarray]
+    mean_errors: dict[str, np.ndarray]
     deviations: np.ndarray
     rates: np.ndarray
     frame: str = "hub"
 
-    def passes(self, angle: float = ANGLE, source: str | None = None) -> float | None:
+    def passing_time(self, angle: float = UNTRUSTED_PITCH, source: str | None = None) -> float | None:
         """First time (s) at which, in half of all runs, the error of roll or pitch exceeds ``angle`` (rad).
 
-        source : one of ``means`` or "noise" alone; None: all together.
+        source : one of ``mean_errors`` or "noise" alone; None: all together.
         """
         from scipy.special import ndtr
 
         mean = sum(
-            (means for name, means in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3))
+            (means for name, means in self.mean_errors.items() if source in (None, name)),
+            np.zeros((len(self.times), 3)),
         )
         spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
         mean, deviation = mean[:, :2], np.maximum(spread[:, :2], 1e-300)
@@ -82,12 +83,12 @@ class Drift:
     @property
     def angle(self) -> float:
         """Error (rad) of roll or pitch beyond which the section forces of a free run are not trusted."""
-        return ANGLE if self.frame == "inertial" else UPRIGHT
+        return UNTRUSTED_PITCH if self.frame == "inertial" else UPRIGHT
 
     @property
-    def trusted(self) -> float:
+    def trusted_time(self) -> float:
         """Time (s) until which the section forces of a free run are trusted; at most the duration of the run."""
-        passed = self.passes(self.angle)
+        passed = self.passing_time(self.angle)
         return float(self.times[-1]) if passed is None else passed
 
     def trust(self, angle: float | None = None) -> Trust:
@@ -95,21 +96,23 @@ class Drift:
         the motion itself.
         """
         limit = self.angle if angle is None else angle
-        times = {name: self.passes(limit, name) for name in ("noise", *self.means)}
-        return Trust({**times, "all together": self.passes(limit)}, float(self.rates.max()), limit)
+        times = {name: self.passing_time(limit, name) for name in ("noise", *self.mean_errors)}
+        return Trust({**times, "all together": self.passing_time(limit)}, float(self.rates.max()), limit)
 
 
-def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
+def predicted_drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
     """Drift of a free run under hub forces that are given in a frame and sampled every ``period`` (s), over a duration
     (s).
     """
-    body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
+    body, law = rigid(vehicle), _AngleResponse(rigid(vehicle), frame, np.linspace(0.0, duration, SUMMED_TIMES + 1))
     noise = period * body.turning(level.deviations(vehicle))
-    spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
+    spread = np.sqrt(
+        np.diagonal(law.time_integral(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2)
+    )
     means = dict[str, np.ndarray]()
     if level.bias is not None:
         turning = np.linalg.solve(body.inertia, body.moments(np.asarray(level.bias, float)[None])[0])
-        means["bias"] = law.summed(law.impulse) @ turning
+        means["bias"] = law.time_integral(law.impulse) @ turning
     for name, start, response in (("tilt", level.tilt, "step"), ("rate", level.rate, "impulse")):
         if np.any(start):
             means[f"{name} at the start"] = getattr(law, response) @ np.array([*start, 0.0])
@@ -170,7 +173,7 @@ class _AngleResponse:
         """Response (n, 3, 3) of the angles to an initial tilt."""
         return self._matrices_of_modes(np.cosh(np.outer(self.times, self._modes[0])))
 
-    def summed(self, values: np.ndarray) -> np.ndarray:
+    def time_integral(self, values: np.ndarray) -> np.ndarray:
         """Integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
         steps = 0.5 * (values[1:] + values[:-1]) * self.times[1]
         return np.concatenate((np.zeros_like(values[:1]), np.cumsum(steps, axis=0)))

@@ -17,30 +17,38 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.drift import score
-from models.drift.score import SURPRISED, Errors, Limits, RunFigures, Verdict, low_pass, rms
-from models.fatigue.damage import SLOPE, damage_ratio, pseudo_damage
+from models.drift.score import (
+    DOUBTFUL_INNOVATION_LIMIT,
+    Errors,
+    Limits,
+    RunFigures,
+    Verdict,
+    low_pass,
+    root_mean_square,
+)
+from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio, pseudo_damage
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.systems.measured.section_run import DAMPING, AttitudeHold, SectionOutcome, SectionRun
+from models.systems.measured.section_run import PULL_DAMPING, AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.sections import SectionChannel
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid
 
-LIMITS = Limits(artificial_share=0.1)
+RUN_LIMITS = Limits(artificial_share=0.1)
 """From where on a run is not good enough. A pull of 5 Hz, whose moment is 12 % of what turns the chassis, takes 5 % off
 the damage of engine mounts on a rough road; one of 0.7 Hz 2 % of it and 1 %."""
-DISAGREES = 0.15
+LARGEST_DISAGREEMENT = 0.15
 """Rms of the error of a check channel by its own, both without means and without what is known to be noise: a gain
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
-LOUD = 1 / 3
+LARGEST_NOISE_SHARE = 1 / 3
 """Part of a check channel that may be noise."""
-BANDS = (0.0, 0.5, 4.0, 20.0, 80.0, math.inf)
+FREQUENCY_BANDS = (0.0, 0.5, 4.0, 20.0, 80.0, math.inf)
 """Hz: drift and slow motion, the body on its springs, wheels and engine, what stiff mounts pass on, the rest."""
-SEGMENT = 8.0
+SEGMENT_LENGTH = 8.0
 """s, of the stretches whose spectra are averaged."""
-STRETCH, HALF = 1.0, 0.5
+STRETCH_LENGTH, STRETCH_ERROR_LIMIT = 1.0, 0.5
 """s; part of a channel's own rms: a stretch this long with a larger error is not to be trusted."""
-WORDS = {
+WORDS_OF_SCORE = {
     "I pitch''": "what turns the chassis",
     "the measured pitch": "measured roll and pitch",
     "pitch wrong": "roll or pitch wrong",
@@ -48,7 +56,7 @@ WORDS = {
     "pitch of": "roll or pitch of",
 }
 """What ``score`` says of the pitch plane, and what it means here."""
-EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
+EFFECTS_OF_HOLD = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
 """Methods of holding a run, by the names that ``score`` has for them."""
 
 
@@ -65,24 +73,25 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ChannelComparison:
     """Comparison of one check channel with the run.
 
-    offset : mean of the error; bands : of all but that; explained : part of the measured variance that the run gives,
-    1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
-    trusted : s until the error of a stretch of ``STRETCH`` s exceeds ``HALF`` of the channel's rms, infinite if never.
+    offset : mean of the error; bands : of all but that; explained_variance : part of the measured variance that the run
+    gives, 1 at best; damage : of the run divided by that of the channel, by slope, NaN where the channel never moves;
+    trusted_time : s until the error of a stretch of ``STRETCH_LENGTH`` s exceeds ``STRETCH_ERROR_LIMIT`` of the
+    channel's rms, infinite if never.
     """
 
     signal: Signal
     answer: SectionChannel
     offset: float
     bands: tuple[Band, ...]
-    explained: float
+    explained_variance: float
     damage: dict[float, float]
-    trusted: float
+    trusted_time: float
 
 
-def checks(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
+def channels_to_compare(job: SectionRun) -> tuple[tuple[Signal, SectionChannel], ...]:
     """Every measured channel that the run is compared with, and the run's channel for it: channels named as checks, and
     accelerations.
 
@@ -99,7 +108,7 @@ def _same_axes(job: SectionRun, signal: Signal) -> bool:
     return signal.frame != "inertial" or signal.quantity == "angle"
 
 
-def overlay(
+def paired_channels(
     recording: Recording, run: SectionOutcome, signal: Signal, answer: SectionChannel
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,) in s of a run, and the measured and the computed values (n,) of one channel."""
@@ -114,19 +123,19 @@ def compare(
     signal: Signal,
     answer: SectionChannel,
     slopes: tuple[float, ...] = (3.0, 5.0, 8.0),
-) -> Compared:
+) -> ChannelComparison:
     """Compare a measured channel with the run's channel over the time of the run."""
-    _, measured, computed = overlay(recording, run, signal, answer)
+    _, measured, computed = paired_channels(recording, run, signal, answer)
     known = np.isfinite(measured)
     if not known.any():
-        return Compared(signal, answer, math.nan, (), math.nan, dict.fromkeys(slopes, math.nan), math.inf)
+        return ChannelComparison(signal, answer, math.nan, (), math.nan, dict.fromkeys(slopes, math.nan), math.inf)
     error, size = computed - measured, float(np.std(measured[known]))
     offset, true = float(np.mean(error[known])), {slope: pseudo_damage(measured[known], slope) for slope in slopes}
-    return Compared(
+    return ChannelComparison(
         signal,
         answer,
         offset,
-        _bands(measured, error, run.period),
+        _rms_by_band(measured, error, run.period),
         1.0 - float(np.var(error[known])) / size**2 if size > 0 else math.nan,
         {
             slope: pseudo_damage(computed[known], slope) / damage if damage > 0 else math.nan
@@ -136,11 +145,11 @@ def compare(
     )
 
 
-def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band, ...]:
+def _rms_by_band(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band, ...]:
     """Rms of the measured values and of the error by frequency band, from averaged spectra of overlapping segments
     under a Hann window. Segments with gaps are left out.
     """
-    length = min(round(SEGMENT / period), len(error))
+    length = min(round(SEGMENT_LENGTH / period), len(error))
     window = np.hanning(length + 1)[:-1]
     power, used = np.zeros((2, length // 2 + 1)), 0
     for first in range(0, len(error) - length + 1, max(length // 2, 1)):
@@ -152,7 +161,7 @@ def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band
         return ()
     power *= 2.0 / (used * length * np.sum(window**2))  # mean squares, from both halves of the spectrum
     frequencies, bands = np.fft.rfftfreq(length, period), []
-    for low, high in pairwise(BANDS):
+    for low, high in pairwise(FREQUENCY_BANDS):
         inside = (frequencies >= low) & (frequencies < high)
         if inside.any():
             bands.append(Band(low, min(high, 0.5 / period), *np.sqrt(power[:, inside].sum(axis=1))))
@@ -160,20 +169,22 @@ def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band
 
 
 def _trusted_time(error: np.ndarray, size: float, period: float) -> float:
-    """Time (s) at which the rms error of a stretch first exceeds ``HALF`` of ``size``; infinite if it never does."""
-    length = max(round(STRETCH / period), 1)
+    """Time (s) at which the rms error of a stretch first exceeds ``STRETCH_ERROR_LIMIT`` of ``size``; infinite if it
+    never does.
+    """
+    length = max(round(STRETCH_LENGTH / period), 1)
     whole = error[: len(error) // length * length].reshape(-1, length)
     rms = np.sqrt(np.nanmean(np.where(np.isfinite(whole), whole, 0.0) ** 2, axis=1))
-    beyond = np.flatnonzero(rms > HALF * size)
+    beyond = np.flatnonzero(rms > STRETCH_ERROR_LIMIT * size)
     return float(beyond[0] * length * period) if len(beyond) else math.inf
 
 
 def judge(
     job: SectionRun,
     run: SectionOutcome,
-    limits: Limits = LIMITS,
+    limits: Limits = RUN_LIMITS,
     trusted: float | None = None,
-    compared: Sequence[Compared] = (),
+    compared: Sequence[ChannelComparison] = (),
     noise: Mapping[str, float] | None = None,
 ) -> Verdict:
     """The verdict on the run of a job that an engineer can give without knowing the true run.
@@ -184,13 +195,15 @@ def judge(
     shares = {
         channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared
     }
-    off = {name: share for name, share in shares.items() if not share <= DISAGREES}
+    off = {name: share for name, share in shares.items() if not share <= LARGEST_DISAGREEMENT}
     if off:
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
-        return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
+        return Verdict(
+            "rejected", f"channels that were not put in disagree (at most {LARGEST_DISAGREEMENT:.0%}): {told}"
+        )
     verdict = score.blind_verdict(
         figures_of_run(run, job.vehicle),
-        EFFECTS[job.hold.method],
+        EFFECTS_OF_HOLD[job.hold.method],
         run.period * (run.done - 1),
         limits,
         trusted,
@@ -203,28 +216,35 @@ def filter_doubts(run: SectionOutcome) -> tuple[Finding, ...]:
     """Doubts because the innovations of the filter that held a run are too large, or because it calls measurements
     biased.
     """
-    if not run.surprise > SURPRISED:
-        return tuple(Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.doubts)
+    if not run.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT:
+        return tuple(
+            Finding("filter", "doubt", "recording", f"{text[0].upper()}{text[1:]}.") for text in run.filter_objections
+        )
     text = (
-        f"The filter's innovations squared are {run.surprise:.3g} times what the noise of forces and angles "
+        f"The filter's innovations squared are {run.normalised_innovation:.3g} times what the noise of "
+        "forces and angles "
         "allows: a channel is off by a little (gain, offset, delay, a spike, a held value, a load that is not in "
         "the vehicle file), and forces along the vehicle, which small angles make, may be wrong by much."
     )
-    return (Finding("filter", "doubt", "recording", text, run.surprise, "1"),)
+    return (Finding("filter", "doubt", "recording", text, run.normalised_innovation, "1"),)
 
 
 def judge_beside_truth(
-    run: SectionOutcome, true: VirtualMeasurement, hold: AttitudeHold, limits: Limits = LIMITS, slope: float = SLOPE
+    run: SectionOutcome,
+    true: VirtualMeasurement,
+    hold: AttitudeHold,
+    limits: Limits = RUN_LIMITS,
+    slope: float = WOEHLER_SLOPE,
 ) -> Verdict:
     """The verdict on a run of a virtual measurement, from its comparison with the true run."""
-    figures = figures_of_run(run, true.vehicle), errors(run, true, slope)
-    return _in_space(score.verdict(*figures, EFFECTS[hold.method], limits))
+    figures = figures_of_run(run, true.vehicle), errors_of_run(run, true, slope)
+    return _in_space(score.verdict_on_run(*figures, EFFECTS_OF_HOLD[hold.method], limits))
 
 
 def _in_space(verdict: Verdict) -> Verdict:
     """The verdict with the words for the pitch plane replaced by those for a vehicle that also rolls."""
     reason = verdict.reason
-    for plane, space in WORDS.items():
+    for plane, space in WORDS_OF_SCORE.items():
         reason = reason.replace(plane, space)
     return Verdict(verdict.word, reason)
 
@@ -238,12 +258,16 @@ def figures_of_run(run: SectionOutcome, vehicle: CutVehicle) -> RunFigures:
         moment, rate = run.samples(f"stabiliser {name}"), run.samples(f"{chassis} {name} rate")
         moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
         shares = _rms_ratio(moment, turning), _rms_ratio(low_pass(moment, run.period), low_pass(turning, run.period))
-        figures.append(RunFigures(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
+        figures.append(RunFigures(root_mean_square(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
     return max(figures, key=lambda each: each.moment_share_band)
 
 
 def _rms_ratio(values: np.ndarray, total: np.ndarray) -> float:
-    return rms(values) / rms(total) if rms(total) > 0 else float(rms(values) > 0)
+    return (
+        root_mean_square(values) / root_mean_square(total)
+        if root_mean_square(total) > 0
+        else float(root_mean_square(values) > 0)
+    )
 
 
 def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float:
@@ -261,14 +285,14 @@ def uncertainty(vehicle: CutVehicle, hold: AttitudeHold, period: float) -> float
     corner = 2.0 * math.pi * hold.bandwidth
     pushed = np.diag(rigid(vehicle).turning(np.tile(np.repeat([hold.force, hold.moment], 3), len(vehicle.hubs))))[:2]
     each = (
-        hold.angle**2 * corner / (4 * DAMPING)
-        + hold.rate**2 * DAMPING / corner
-        + float(pushed.max()) / (4 * DAMPING * corner**3)
+        hold.angle**2 * corner / (4 * PULL_DAMPING)
+        + hold.rate**2 * PULL_DAMPING / corner
+        + float(pushed.max()) / (4 * PULL_DAMPING * corner**3)
     )
     return 2.0 * math.sqrt(period * each)
 
 
-def errors(run: SectionOutcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
+def errors_of_run(run: SectionOutcome, true: VirtualMeasurement, slope: float = WOEHLER_SLOPE) -> Errors:
     """Errors of a run relative to the true run, at the times of the run's answers: of section forces in springs, mounts
     and bars, and of angles.
     """
@@ -278,16 +302,16 @@ def errors(run: SectionOutcome, true: VirtualMeasurement, slope: float = SLOPE) 
     for element, load in zip(true.vehicle.elements, loads.T, strict=True):
         computed = run.samples(f"{element.name} {'M' if element.unit != 'N' else 'F'}")
         damage[element.name] = damage_ratio(computed, load, slope)
-        force[element.name] = rms(computed - load)
+        force[element.name] = root_mean_square(computed - load)
     roll, pitch, height = (
         np.abs(run.samples(f"{chassis} {name}") - states[:, i])
         for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))
     )
     tilt = np.maximum(roll, pitch)
-    return Errors(damage, force, {}, float(tilt.max()), rms(tilt), float(height.max()))
+    return Errors(damage, force, {}, float(tilt.max()), root_mean_square(tilt), float(height.max()))
 
 
-def disagreement(compared_channel: Compared, noise: float = 0.0) -> float:
+def disagreement(compared_channel: ChannelComparison, noise: float = 0.0) -> float:
     """Ratio of the rms error of a check channel to the channel's rms, after its noise (standard deviation) is removed
     from both.
 
@@ -295,6 +319,6 @@ def disagreement(compared_channel: Compared, noise: float = 0.0) -> float:
     """
     noise = 0.0 if math.isnan(noise) else noise
     error, whole = (sum(getattr(band, name) ** 2 for band in compared_channel.bands) for name in ("error", "measured"))
-    if whole <= 0.0 or noise > LOUD * math.sqrt(whole):
+    if whole <= 0.0 or noise > LARGEST_NOISE_SHARE * math.sqrt(whole):
         return 0.0
     return math.sqrt(max(error - noise**2, 0.0) / (whole - noise**2))

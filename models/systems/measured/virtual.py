@@ -16,17 +16,17 @@ from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED, HubRun
-from models.measured.channel import BLOCK
+from models.measured.channel import SAMPLES_PER_BLOCK
 from models.measured.columns import Columns
-from models.measured.faults_of_measurement import Faults, measured
+from models.measured.faults_of_measurement import Faults, measured_samples
 from models.measured.faults_of_measurement import check as check_faults
 from models.measured.formats import write
 from models.measured.formats.writing import ChannelGroup
 from models.measured.recording import Recording
-from models.measured.signal import HUB, Quantity, Signal
-from models.sensors.rotations import from_cardan, matrix
+from models.measured.signal import HUB_COMPONENTS, Quantity, Signal
+from models.sensors.rotations import from_cardan, rotation_matrix
 from models.sensors.sensor_array import in_space
-from models.systems.hub_forces.measurement import travels
+from models.systems.hub_forces.measurement import element_travels
 from models.systems.hub_forces.run import on_road
 from models.systems.hub_forces.scene import Frame, Road
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
@@ -44,7 +44,7 @@ FILE_UNITS: dict[Quantity, tuple[str, float]] = {
     "strain": ("-", 1.0),
 }
 """Unit of each quantity in the files that are written, and its factor: those of a test track, not SI throughout."""
-BEGAN = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
+START_OF_MEASUREMENT = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
 """When a virtual measurement began: the same in every one, so that it repeats bit for bit."""
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -96,7 +96,7 @@ class VirtualMeasurement:
         """Samples (m, signals), SI, with the faults of the transducers applied; NaN where a transducer gave no
         value.
         """
-        return measured(faults, self.signals, self.values, self.step, self.every, seed, path)
+        return measured_samples(faults, self.signals, self.values, self.step, self.every, seed, path)
 
 
 def virtual_measurement(
@@ -116,10 +116,10 @@ def virtual_measurement(
     )
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
-    moved = travels(vehicle, run) if virtual.travels else {}
+    moved = element_travels(vehicle, run) if virtual.travels else {}
     checks = [run.elements[:, [elements.index(name)]] for name in virtual.sections]
     checks += [moved[name][:, None] for name in virtual.travels]
-    values = np.hstack([hubs, _motion(vehicle, run, virtual.accelerometers), *checks])
+    values = np.hstack([hubs, _chassis_motion(vehicle, run, virtual.accelerometers), *checks])
     return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (virtual.sampling_rate * virtual.step)), told)
 
 
@@ -138,16 +138,18 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
     for place in ("travels", "sections"):
         for name in (name for name in getattr(virtual, place) if name not in known):
             raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
-    signals = _signals(vehicle, virtual)
+    signals = _signals_of_channels(vehicle, virtual)
     check_faults(virtual.faults, signals, file)
     return signals
 
 
-def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
+def _signals_of_channels(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
     """Signals of hubs, motion and check channels, in the order of their columns."""
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
-        (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB
+        (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame)
+        for hub in vehicle.hubs
+        for name, what, axis, _ in HUB_COMPONENTS
     ]
     rows += [(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
     rows += [(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
@@ -165,7 +167,7 @@ def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
     )
 
 
-def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
+def _chassis_motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
     """Roll and pitch, rates about the chassis' own axes as gyros read them, and readings of its accelerometers, as
     columns (n, m).
     """
@@ -178,7 +180,7 @@ def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) ->
     slopes = make_interp_spline(run.times, np.hstack([run.states[:, [n + X, n + Y, n + Z]], rates]), k=5).derivative()
     felt, alpha = np.split(np.asarray(slopes(run.times)), 2, axis=1)
     felt[:, 2] += GRAVITY
-    turn = matrix(from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
+    turn = rotation_matrix(from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
     arms = np.array(list(places.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
     readings = in_space(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
     return np.hstack([angles, rates, readings.reshape(len(readings), -1)])
@@ -198,10 +200,10 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     )
 
 
-def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
+def channel_group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> ChannelGroup:
     """Samples (n, signals), SI, as a group of channels in the units of the file to be written."""
     factors = np.array([signal.factor for signal in signals])
-    blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
+    blocks = (samples[i : i + SAMPLES_PER_BLOCK] / factors for i in range(0, len(samples), SAMPLES_PER_BLOCK))
     comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
     names, units = tuple(s.channel for s in signals), tuple(s.unit for s in signals)
     return ChannelGroup(names, units, comments, period, len(samples), blocks)
@@ -214,21 +216,24 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
     Returns the scene's path. Raises InputError where a file exists or the format has no room for the channels.
     """
     assert scene.virtual is not None
-    path, groups = folder / f"measured.{scene.virtual.format}", [group(virtual.signals, samples, virtual.period)]
-    write(path, groups, BEGAN, f"virtual measurement: {scene.title}")
+    path, groups = (
+        folder / f"measured.{scene.virtual.format}",
+        [channel_group(virtual.signals, samples, virtual.period)],
+    )
+    write(path, groups, START_OF_MEASUREMENT, f"virtual measurement: {scene.title}")
     table = scene.model_dump(exclude_unset=True, exclude={"virtual", "files", "sensors", "file", "folder", "options"})
     table |= {f"effects.{name}": entries for name, entries in table.pop("effects", {}).items()}
-    lines = [f"{key} = {_toml(value)}" for key, value in table.items() if not isinstance(value, dict)]
+    lines = [f"{key} = {_toml_text(value)}" for key, value in table.items() if not isinstance(value, dict)]
     for name, entries in table.items():
         if isinstance(entries, dict):
-            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in entries.items())]
+            lines += ["", f"[{name}]", *(f"{key} = {_toml_text(value)}" for key, value in entries.items())]
     for name, place in scene.virtual.accelerometers.items():
-        lines += ["", f"[sensors.{_toml(name)}]", f'body = "{virtual.vehicle.chassis}"', f"position = {place}"]
+        lines += ["", f"[sensors.{_toml_text(name)}]", f'body = "{virtual.vehicle.chassis}"', f"position = {place}"]
     write_whole(folder / "scene.toml", "\n".join([*lines, "", map_lines(virtual.signals, path.name)]))
     return folder / "scene.toml"
 
 
-def _toml(value: object) -> str:
+def _toml_text(value: object) -> str:
     """TOML text of a value: a string, number, boolean or list of these."""
     return json.dumps(value, ensure_ascii=False)
 
@@ -243,7 +248,7 @@ def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> st
     return "\n".join([*lines, "]", ""])
 
 
-def recording(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
+def recording_of_samples(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
     """The samples (m, signals) as a recording, without detour through files and maps; ``path`` is the file of its
     columns.
     """

@@ -12,17 +12,17 @@ from models.core.result import Result
 from models.engines.assembly import Assembly
 from models.vehicles.pitch_plane import Parameters
 
-SMALL = 0.3
+SMALL_PITCH = 0.3
 """rad: where sines are taken for angles, the pitch may be so large: 1.5 % of the sine."""
-STEEPEST = 0.5
+STEEPEST_PITCH = 0.5
 """rad: no road is steeper, and the wheels, which only move vertically, are 12 % nearer to each other."""
-PUSHES = 1.0
+PULL_LIMIT = 1.0
 """N: a tyre that pulls by less is at its edge."""
-SIDEWALL = 0.12
+LARGEST_TYRE_TRAVEL = 0.12
 """m: a tyre that is pressed further rests on its rim; a car's sidewall is 0.1 to 0.14 m high."""
-SEATED = 1e-3
+SPRING_EDGE = 1e-3
 """m: a spring that is longer than it is free by less is at its edge."""
-ARTIFICIAL = 0.15
+ARTIFICIAL_SHARE_LIMIT = 0.15
 """Rms of an artificial moment up to 15 Hz divided by that of I pitch'', and of the force divided by that of m3 z3'',
 from which on it takes part in the damage: the limit that models/drift/score.py judges stabilisers by."""
 
@@ -31,18 +31,18 @@ def assumptions(assembly: Assembly) -> list[Assumption]:
     """Assumptions of the equations of this scene."""
     lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
     listed = _of_tyres(assembly, lifts) if assembly.mode in ("free", "road") else []
-    listed.append(_springs(assembly, lifts))
+    listed.append(_spring_assumption(assembly, lifts))
     if assembly.vehicle.geometry == "linear":
         remedy = 'use vehicle.geometry = "exact"'
         says = "the pitch is so small that its sine is itself"
-        listed.append(Assumption("small angles", says, remedy, _pitch, "rad", -SMALL, SMALL))
-    listed.append(upright(_remedy(assembly), _pitch))
+        listed.append(Assumption("small angles", says, remedy, _watched_pitch, "rad", -SMALL_PITCH, SMALL_PITCH))
+    listed.append(upright_assumption(_pitch_remedy(assembly), _watched_pitch))
     if assembly.vehicle.pitch_springs or assembly.guided:
-        listed.append(_artificial(assembly))
+        listed.append(_artificial_assumption(assembly))
     return [*listed, *assembly.assumptions]
 
 
-def principal(assembly: Assembly) -> tuple[str, ...]:
+def principal_channels(assembly: Assembly) -> tuple[str, ...]:
     """Channels whose error is estimated, without prescribed motions and forces, which have no error."""
     free = tuple(name for name, place in (("z3", 2), ("pitch", 3)) if place not in assembly.guided)
     wheels = ("f1", "f2") if assembly.mode in ("free", "road") else ()
@@ -50,16 +50,16 @@ def principal(assembly: Assembly) -> tuple[str, ...]:
     return (*free, *wheels, "f3", "f4", *enforced.get(assembly.mode, ()))
 
 
-def watching(**channels: str) -> partial[Watched]:
+def watch_function(**channels: str) -> partial[Watched]:
     """Watch function of an assumption; ``channels`` gives the run's channel for each name of a part."""
-    return partial(_channels, channels)
+    return partial(_watched_channels, channels)
 
 
-def _channels(channels: dict[str, str], run: Result) -> Watched:
+def _watched_channels(channels: dict[str, str], run: Result) -> Watched:
     return {name.replace("_", " "): run[channel] for name, channel in channels.items()}
 
 
-_pitch = watching(chassis="pitch")
+_watched_pitch = watch_function(chassis="pitch")
 
 
 def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
@@ -69,13 +69,13 @@ def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
         "use tyres that are stiffer (vehicle.override), or drive more slowly",
         partial(_deflections, assembly.parameters),
         "m",
-        most=SIDEWALL,
+        upper_limit=LARGEST_TYRE_TRAVEL,
     )
     if lifts:
         return [pressed]
     says, remedy = "linear tyres stay on the road", "name the effect lift_off, whose tyres only push"
-    forces = watching(front_wheel="f1", rear_wheel="f2")
-    return [Assumption("tyres press", says, remedy, forces, "N", least=-PUSHES), pressed]
+    forces = watch_function(front_wheel="f1", rear_wheel="f2")
+    return [Assumption("tyres press", says, remedy, forces, "N", lower_limit=-PULL_LIMIT), pressed]
 
 
 def _deflections(p: Parameters, run: Result) -> Watched:
@@ -83,7 +83,7 @@ def _deflections(p: Parameters, run: Result) -> Watched:
     return {"front tyre": run["f1"] / p.k1, "rear tyre": run["f2"] / p.k2}
 
 
-def _springs(assembly: Assembly, lifts: bool) -> Assumption:
+def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
     """Assumption that no suspension's spring pulls: a droop stop, which would prevent it, is not in the equations."""
     remedy = "no effect adds a droop stop: start lower, or excite it less"
     if assembly.mode not in ("free", "road"):
@@ -96,7 +96,7 @@ def _springs(assembly: Assembly, lifts: bool) -> Assumption:
         remedy,
         partial(_compressions, assembly.parameters, assembly.vehicle.geometry == "exact"),
         "m",
-        least=-SEATED,
+        lower_limit=-SPRING_EDGE,
     )
 
 
@@ -109,13 +109,13 @@ def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
     }
 
 
-def upright(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
+def upright_assumption(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
     """Assumption that the pitch stays as small as that of a vehicle on a road."""
     says = "the chassis pitches less than any road does, as wheels only move vertically"
-    return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST, STEEPEST)
+    return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST_PITCH, STEEPEST_PITCH)
 
 
-def _remedy(assembly: Assembly) -> str:
+def _pitch_remedy(assembly: Assembly) -> str:
     """Advice on how to keep the pitch small."""
     if assembly.guided:
         return "no effect lifts it: check the file of the prescribed pitch, and its unit"
@@ -124,7 +124,7 @@ def _remedy(assembly: Assembly) -> str:
     return "hold it by prescribed_pitch, kalman_filter or pitch_spring, or end the run before"
 
 
-def _artificial(assembly: Assembly) -> Assumption:
+def _artificial_assumption(assembly: Assembly) -> Assumption:
     """Assumption that the forces which hold pitch or heave are small compared with the vehicle's own forces."""
     moved = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
     soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
@@ -134,7 +134,7 @@ def _artificial(assembly: Assembly) -> Assumption:
         moved if assembly.guided else soft,
         partial(_artificial_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",
-        most=ARTIFICIAL,
+        upper_limit=ARTIFICIAL_SHARE_LIMIT,
     )
 
 

@@ -2,7 +2,7 @@
 
 from models.engines.assembly import Assembly, Settings
 from models.engines.export import Exported, ExportSubject, of_exudyn, of_mujoco
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 
 AXES = {
     "mujoco": "x forward, y right, z down, so that gravity is positive; pitch is positive with the nose up.",
@@ -21,7 +21,7 @@ INPUTS = {
 
 def exported(scene: Scene, engine: str) -> Exported:
     """Export the pitch-plane vehicle to "mujoco" or "exudyn"."""
-    assembly, subject = assemble(scene), ExportSubject(scene.title, scene.file, AXES[engine])
+    assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":
         return _in_exudyn(assembly, subject, left_out)

@@ -28,9 +28,9 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, guard
 from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
-from models.systems.pitch_plane.scene import Scene, assemble, effects_in_order, settings_of
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
 
-DRIFT = 0.05
+DRIFT_OFF_PITCH = 0.05
 """A path has drifted off when its pitch is this far (rad) from the true one, unless the job says otherwise."""
 
 
@@ -54,7 +54,7 @@ class NoisePaths:
     settings: Settings
     rows: np.ndarray
     truth: np.ndarray
-    threshold: float = DRIFT
+    threshold: float = DRIFT_OFF_PITCH
 
     def assembly(self, path: int) -> Assembly:
         """The assembly of the scene with the noise path of this number."""
@@ -68,7 +68,7 @@ class NoisePaths:
         """Trajectory of one path over the whole run; RunFailed if it leaves all bounds."""
         return build(self.engine, self.assembly(path), self.settings).run()
 
-    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
         """Trajectory of each path, or its RunFailed; PathFailed for a failure that is not one of the simulated
         physics.
         """
@@ -87,7 +87,7 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        columns = zip(*map(self._saved_part, self.runs(paths)), strict=True)
+        columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
     def _saved_part(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
@@ -117,7 +117,7 @@ def noise_paths(
     scene: Scene,
     times: np.ndarray,
     truth: np.ndarray | None = None,
-    threshold: float = DRIFT,
+    threshold: float = DRIFT_OFF_PITCH,
     engine: str = "reference",
 ) -> NoisePaths:
     """The job that runs a scene's noise paths; states are kept at ``times`` (s), multiples of the step.
@@ -136,17 +136,17 @@ def noise_paths(
             settings.integrator,
             "picks its own steps: an ensemble keeps states at common times and needs fixed ones",
         )
-    base, rest = _split(scene)
+    base, rest = _shared_and_path_effects(scene)
     if truth is None:
         silent = scene.effects["force_noise"].model_copy(update={"deviation": 0.0})
         quiet = scene.model_copy(update={"effects": scene.effects | {"force_noise": silent}})
-        truth = build("reference", assemble(quiet), settings_of(quiet, "reference")).run().states[:, 3]
+        truth = build("reference", assembly_of_scene(quiet), settings_of(quiet, "reference")).run().states[:, 3]
     if truth.shape != (settings.steps + 1,):
         raise InputError(scene.file, "truth", list(truth.shape), f"must have one pitch per step: {settings.steps + 1}")
     return NoisePaths(base, rest, engine, settings, _step_rows(scene, settings, times), truth, threshold)
 
 
-def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
+def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     """The assembly that all paths share, and the effects that have a path or follow an effect that has one."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
@@ -154,7 +154,7 @@ def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
         if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
             unshared.append(name)
     shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in unshared}})
-    return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in unshared)
+    return replace(assembly_of_scene(shared), scene=scene), tuple((name, scene.effects[name]) for name in unshared)
 
 
 def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
@@ -176,7 +176,7 @@ class MujocoThreads(NoisePaths):
         if self.engine != "mujoco" or self.base.guided:
             raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
 
-    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+    def trajectories(self, paths: range) -> Iterator[Trajectory | RunFailed]:
         """Trajectory of each path, all from one call of ``rollout``. If MuJoCo warns, the paths are run again one by
         one.
         """
@@ -184,7 +184,7 @@ class MujocoThreads(NoisePaths):
         times = self.settings.step * np.arange(self.settings.steps + 1)
         marched, warned = self._rollout(models)
         if warned:
-            yield from super().runs(paths)
+            yield from super().trajectories(paths)
             return
         for states in marched:
             try:
@@ -221,13 +221,17 @@ class MujocoThreads(NoisePaths):
 
 
 def mujoco_threads(
-    scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT, threads: int = 2
+    scene: Scene,
+    times: np.ndarray,
+    truth: np.ndarray | None = None,
+    threshold: float = DRIFT_OFF_PITCH,
+    threads: int = 2,
 ) -> MujocoThreads:
     """The job of ``noise_paths`` for MuJoCo with several threads."""
     return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
 
 
-def gap(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
+def largest_difference(reference: Arrays, other_paths: Arrays, times: np.ndarray) -> float:
     """Largest difference between two sets of paths in any state before both drift off, divided by the reference's
     largest state in that time.
 

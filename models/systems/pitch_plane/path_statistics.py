@@ -5,11 +5,11 @@ Memory is that of the rows in time, however many paths there are.
 
 import numpy as np
 
-from models.ensemble.statistics import FAN
+from models.ensemble.statistics import FAN_PERCENTILES
 from models.ensemble.store import Arrays
 from models.ensemble.streamed import Moments, Spread, StreamedCovariance, Tally
 
-PITCH = 3
+PITCH_STATE = 3
 """Place of the pitch among the states."""
 
 
@@ -31,10 +31,10 @@ class PathStatistics:
         errors = block["states"] - self._true
         self.moments.add(errors)
         self.covariance.add(errors)
-        self._spread.add(errors[:, :, PITCH])
+        self._spread.add(errors[:, :, PITCH_STATE])
         self.drift_off.add(block["drift_off"])
         self.lost += int(np.isfinite(block["failed"]).sum())
-        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(block["states"][:, :, PITCH]), axis=0))
+        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(block["states"][:, :, PITCH_STATE]), axis=0))
         kept = sum(len(each["drift_off"]) for each in self._blocks)
         if kept < self._saved:
             self._blocks.append({name: values[: self._saved - kept] for name, values in block.items()})
@@ -46,5 +46,7 @@ class PathStatistics:
 
     @property
     def fan(self) -> np.ndarray:
-        """Percentiles FAN of the magnitude of the pitch error (5, rows), each within ``streamed.ACCURACY``."""
-        return self._spread.percentiles(FAN)
+        """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (5, rows), each within
+        ``streamed.ACCURACY``.
+        """
+        return self._spread.percentiles(FAN_PERCENTILES)

@@ -30,16 +30,16 @@ from models.engines.assembly import Assembly
 from models.engines.reference import compiled, march_of
 from models.engines.stability import first_order, linearised
 
-KEPT = np.array([0, 1, 3, 4, 5, 7])
+KEPT_STATES = np.array([0, 1, 3, 4, 5, 7])
 """Where (z1, z2, pitch) and their rates stand in the state (8,)."""
-RELATIVE = np.eye(8)[KEPT]
-RELATIVE[0:2, 2] = RELATIVE[3:5, 6] = -1.0
+RELATIVE_STATES = np.eye(8)[KEPT_STATES]
+RELATIVE_STATES[0:2, 2] = RELATIVE_STATES[3:5, 6] = -1.0
 """Matrix (6, 8) that turns a state into (z1 - z3, z2 - z3, pitch) and their rates."""
 PITCH_INERTIA = 5
 """Where the pitch inertia stands among the parameters."""
-NUDGES = np.array([1.0, *[1e-5] * 6, 1e-2, *[1e3] * 4])
+DIFFERENCE_WIDTHS = np.array([1.0, *[1e-5] * 6, 1e-2, *[1e3] * 4])
 """Half widths of the differences: none, then m, rad, m/s and rad/s, share of 1/I, N."""
-REACH = 0.7
+LONGEST_SUBSTEP = 0.7
 """Longest substep by the time constant of the fastest pole: RK4 then errs by 1e-3 of that mode a step."""
 
 
@@ -58,14 +58,14 @@ class PitchStep:
         assembly, signal = self.assembly, self.assembly.input
         assert signal is not None
         pole = np.abs(np.linalg.eigvals(first_order(linearised(assembly.vehicle, ())))).max()
-        n = self._substeps = math.ceil(self.period * pole / REACH)
+        n = self._substeps = math.ceil(self.period * pole / LONGEST_SUBSTEP)
         self._rows = (0, 0, 1) if signal.held else (1, 2, 2)
         per_step, ends = n * self._rows[2], 0 if signal.held else 1
         self._inputs = signal.sample(0.0, self.period / per_step, self.count * per_step + ends)
         falling = np.ones(per_step) if signal.held else np.linspace(1.0, 0.0, per_step + 1)
         self._hats = np.column_stack([falling, 1.0 - falling])
         self._p = assembly.parameters.array()
-        self._respond = responding(assembly.mode, assembly.vehicle.geometry)
+        self._respond = compiled_filter_step(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Advance the state x (7,) by a step; returns the new state and its derivatives.
@@ -81,7 +81,7 @@ class PitchStep:
 
 
 @cache
-def responding(mode: str, geometry: str) -> Any:
+def compiled_filter_step(mode: str, geometry: str) -> Any:
     """The compiled filter step with its derivatives for one mode and geometry, compiled when it is first requested.
 
     (x, step, count, inputs, rows, p, hats) -> (7, 12): x after it, its columns d/dx (7), d/d(first force sample) (2)
@@ -95,11 +95,11 @@ def responding(mode: str, geometry: str) -> Any:
         states, transition, parameters = np.empty((count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
-                y, pushed, nudge = np.zeros(8), inputs, sign * NUDGES[column]
-                y[KEPT] = x[:6]
+                y, pushed, nudge = np.zeros(8), inputs, sign * DIFFERENCE_WIDTHS[column]
+                y[KEPT_STATES] = x[:6]
                 parameters[PITCH_INERTIA] = p[PITCH_INERTIA] / (1.0 + x[6] + (nudge if column == 7 else 0.0))
                 if 0 < column < 7:
-                    y[KEPT[column - 1]] += nudge
+                    y[KEPT_STATES[column - 1]] += nudge
                 elif column > 7:
                     pushed = inputs.copy()
                     pushed[:, (column - 8) % 2] += nudge * hats[:, (column - 8) // 2]
@@ -107,16 +107,16 @@ def responding(mode: str, geometry: str) -> Any:
                 end, share = states[count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
                     heave = end[2] if row < 2 else end[6] if 2 < row < 5 else 0.0
-                    transition[row, column] += share * (end[KEPT[row]] - heave)
+                    transition[row, column] += share * (end[KEPT_STATES[row]] - heave)
         transition[6, 0], transition[6, 7] = x[6], 1.0
         return transition
 
     return compiled(respond, ("pitch_step", mode, geometry))
 
 
-PITCH, RATE, INERTIA, STATES = 2, 5, 6, 7
+PITCH, PITCH_RATE, INERTIA_SHARE, FILTER_STATES = 2, 5, 6, 7
 """Where pitch, its rate and the inertia's share stand in the filter's state, and how long it is."""
-KNOWN = 1e-6
+KNOWN_DEVIATION = 1e-6
 """Deviation (m, rad, m/s, rad/s, share) of what is known at the start: nothing beside any measurement, but not 0."""
 
 
@@ -125,7 +125,7 @@ class Measurement:
     """Measurement of the pitch, the pitch rate, or both.
 
     values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
-    period : s; columns : PITCH, RATE or both; deviations : white noise of each column, per sample
+    period : s; columns : PITCH, PITCH_RATE or both; deviations : white noise of each column, per sample
     """
 
     values: np.ndarray
@@ -140,9 +140,10 @@ class PitchEstimate:
 
     states : (n, 7), see above
     covariances : (n, 7, 7), without what the force sample of that very instant has done already
-    pending : (n, 7, 2), what it has: a root of its covariance
-    used, missed : (n,) measured values that were taken in, and that were no numbers
-    surprises : (n,) normalised innovation squared, chi-square of ``used`` degrees of freedom where the filter is
+    pending_noise : (n, 7, 2), what it has: a root of its covariance
+    used_values, missed_values : (n,) measured values that were taken in, and that were no numbers
+    normalised_innovations : (n,) normalised innovation squared, chi-square of ``used_values`` degrees of freedom where
+    the filter is
         consistent; NaN where nothing was measured
     innovations : (n, columns), whitened: independent and of deviation 1 where it is; NaN where nothing was measured
     """
@@ -150,15 +151,15 @@ class PitchEstimate:
     period: float
     states: np.ndarray
     covariances: np.ndarray
-    pending: np.ndarray
-    used: np.ndarray
-    missed: np.ndarray
-    surprises: np.ndarray
+    pending_noise: np.ndarray
+    used_values: np.ndarray
+    missed_values: np.ndarray
+    normalised_innovations: np.ndarray
     innovations: np.ndarray
 
     def errors(self) -> np.ndarray:
         """Covariance (n, 7, 7) of the states' errors."""
-        return self.covariances + self.pending @ self.pending.transpose(0, 2, 1)
+        return self.covariances + self.pending_noise @ self.pending_noise.transpose(0, 2, 1)
 
 
 @dataclass(frozen=True)
@@ -183,10 +184,10 @@ class PitchFilter(ExtendedKalmanFilter):
         """Initial state ``start`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample, per
         step of the filter.
         """
-        super().__init__(dim_x=STATES, dim_z=1)
+        super().__init__(dim_x=FILTER_STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measurement
         self.x, self.P = start.copy(), covariance.copy()
-        self.late = np.zeros((STATES, 2))
+        self.late = np.zeros((FILTER_STATES, 2))
         self._there = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
         self._seen = [self._model_of_columns(there) for there in range(1 << len(measurement.columns))]
 
@@ -250,11 +251,13 @@ def estimate(
     period = min(assembly.input.period, measurement.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
     start = _start(assembly, start_deviation, inertia_deviation)
-    estimated, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measurement))
-    return _smoothed(estimated, steps) if smoother else estimated
+    estimated, steps = _march_filter(
+        PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measurement)
+    )
+    return _smoothed_estimate(estimated, steps) if smoother else estimated
 
 
-def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
+def _march_filter(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
     """Run the filter: predict each step, update with the measurement at its end, and record all of it."""
     n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
     every, width = round(measured.period / period), len(measured.columns)
@@ -278,7 +281,7 @@ def _march(filtered: PitchFilter) -> tuple[PitchEstimate, _Steps]:
     return estimated, _Steps(predictions, transitions, noises)
 
 
-def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
+def _smoothed_estimate(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
     """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
     The smoother supports linear steps only, x -> F x. An eighth state, always 1, carries the difference between the
@@ -291,11 +294,13 @@ def _smoothed(filtered: PitchEstimate, steps: _Steps) -> PitchEstimate:
     transitions[:, :7, :7], transitions[:, 7, 7] = steps.transitions, 1.0
     linear = np.einsum("nij,nj->ni", steps.transitions[1:], filtered.states[:-1])
     transitions[1:, :7, 7] = steps.predictions[1:] - linear
-    states, covariances, _, _ = KalmanFilter(8, 1).rts_smoother(states, covariances, transitions, noises, _inverse)
+    states, covariances, _, _ = KalmanFilter(8, 1).rts_smoother(
+        states, covariances, transitions, noises, _covariance_inverse
+    )
     return replace(filtered, states=states[:, :7], covariances=covariances[:, :7, :7])
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
+def _covariance_inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a covariance (8, 8) of seven states and an eighth that is certain; its row and column are left
     zero.
     """
@@ -310,6 +315,6 @@ def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray,
     """
     p = assembly.parameters
     turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
-    covariance = np.outer(turned, turned) + KNOWN**2 * np.eye(STATES)
-    covariance[INERTIA, INERTIA] += inertia**2
-    return np.append(RELATIVE @ assembly.initial, 0.0), covariance
+    covariance = np.outer(turned, turned) + KNOWN_DEVIATION**2 * np.eye(FILTER_STATES)
+    covariance[INERTIA_SHARE, INERTIA_SHARE] += inertia**2
+    return np.append(RELATIVE_STATES @ assembly.initial, 0.0), covariance

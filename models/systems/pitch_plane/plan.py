@@ -3,7 +3,7 @@
 from models.core.assumptions import assumption_lines
 from models.core.errors import Refused
 from models.core.finding import Finding
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.core.scene_effects import module_of
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly
@@ -11,11 +11,11 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.protocol import check as check_engine
 from models.systems.pitch_plane.assumptions import assumptions
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.vehicles.pitch_plane import STATE_NAMES
 from models.vehicles.plausible_plane import plausible_plane
 
-MODES = {
+MODE_TEXTS = {
     "free": "free motion on the flat road",
     "road": "excited by a road (eq. 38)",
     "force": "excited by wheel forces in the inertial frame (eq. 37)",
@@ -27,7 +27,7 @@ MODES = {
 
 def check(scene: Scene, engines: tuple[str, ...]) -> None:
     """Refuse a scene that cannot be run, before any file is written."""
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     for engine in engines:
         try:
             check_engine(engine, assembly, settings_of(scene, engine))
@@ -37,18 +37,18 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 
 def findings(scene: Scene) -> tuple[Finding, ...]:
     """Doubts about implausible parameters of the vehicle, and about the inputs that drive and hold it."""
-    doubts = (Finding("input", "doubt", scene.file, text) for text in assemble(scene).doubts)
+    doubts = (Finding("input", "doubt", scene.file, text) for text in assembly_of_scene(scene).doubts)
     return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
 
 def describe(scene: Scene) -> str:
     """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
-    motion = f"{MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
+    motion = f"{MODE_TEXTS[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
     lines += [_line("motion", motion)]
     lines += _vehicle(scene, assembly) + effect_lines(scene)
-    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
+    lines += [_line("channels", ", ".join(_channel_lines(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
     lines += [*assumption_lines(assumptions(assembly)), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
@@ -79,7 +79,7 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
     return [*lines, _line("states", ", ".join(STATE_NAMES)), _line("start", start or "all zero")]
 
 
-def _channels(assembly: Assembly) -> list[str]:
+def _channel_lines(assembly: Assembly) -> list[str]:
     names = ["states", "f1", "f2", "f3", "f4", "suspension_moment"]
     names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
     names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
@@ -97,7 +97,7 @@ def trust_line(assembly: Assembly) -> list[str]:
     if limit is None:
         return []
     if limit.until is None and assembly.doubts:
-        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked}")]
+        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked_text}")]
     return [_line("trust", str(limit))]
 
 
@@ -106,13 +106,13 @@ def doubt_lines(assembly: Assembly) -> list[str]:
     return [_line("doubt", text) for text in assembly.doubts]
 
 
-HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
+TABLE_HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
 
 
 def _engines(scene: Scene, assembly: Assembly) -> list[str]:
     """Table of what each engine builds, or why it refuses."""
-    rows = [HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
-    widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(HEADINGS))]
+    rows = [TABLE_HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
+    widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(TABLE_HEADINGS))]
     padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
     note = ["  exudyn is handed M, D and K of the linear vehicle: no spring of its own takes part"]
     return ["  " + "  ".join(row).rstrip() for row in padded] + (note if scene.vehicle.geometry == "linear" else [])

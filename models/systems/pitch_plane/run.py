@@ -18,14 +18,14 @@ from models.engines.assembly import Assembly, Channels, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.model import Model
 from models.engines.protocol import build
-from models.systems.pitch_plane.assumptions import assumptions, principal
-from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.systems.pitch_plane.assumptions import assumptions, principal_channels
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.vehicles.pitch_plane import STATES
 from models.vehicles.pitch_plane_equations import suspension_loads
 
-MEANINGS = ("front wheel, down", "rear wheel, down", "chassis heave, down", "pitch, nose up")
+MEANINGS_OF_STATES = ("front wheel, down", "rear wheel, down", "chassis heave, down", "pitch, nose up")
 """Of STATES."""
-LOOSER = 100.0
+TOLERANCE_FACTOR = 100.0
 """Factor on the tolerance of an adaptive method that tells its error: 0.56 of the calls of a method of order 8."""
 
 
@@ -39,13 +39,13 @@ def run(
     are always judged. The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the
     tree is compared with the reference; the result is in "beside reference".
     """
-    assembly, settings = assembly or assemble(scene), settings or settings_of(scene, engine)
+    assembly, settings = assembly or assembly_of_scene(scene), settings or settings_of(scene, engine)
     rows = slice(None, None, _keep_every(scene, settings))
     model = build(engine, assembly, settings)
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    channels, beside = outputs(assembly, trajectory, model), dict[str, str]()
+    channels, beside = output_channels(assembly, trajectory, model), dict[str, str]()
     if engine in OUTSIDE:
         from models.engines.outside import beside_reference
 
@@ -85,22 +85,22 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     """The result with the errors of its principal channels, estimated from all steps and not only from the saved
     rows.
     """
-    engine, names = run.data.attrs["engine"], principal(assembly)
-    fine, sizes = _series(run.detail.times, channels, names), _sizes(assembly, channels)
+    engine, names = run.data.attrs["engine"], principal_channels(assembly)
+    fine, sizes = _series_of_run(run.detail.times, channels, names), _enforced_sizes(assembly, channels)
     method = CATALOGUE[engine][settings.integrator]
 
     def rerun(changed: Settings) -> Series:
         trajectory = build(engine, assembly, changed).run()
-        return _series(trajectory.times, outputs(replace(assembly, sensors=()), trajectory), names)
+        return _series_of_run(trajectory.times, output_channels(replace(assembly, sensors=()), trajectory), names)
 
     if method.adaptive:
-        looser = _with_longer_engine_step(rerun, replace(settings, tolerance=LOOSER * settings.tolerance))
-        return of_tolerance(run, fine, looser, LOOSER, settings.tolerance, sizes)
+        looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
+        return of_tolerance(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
 
     def longer(times: float, share: float) -> Series:
         return rerun(_settings_of_longer_step(settings, times, share))
 
-    return estimated(run, fine, longer, method.order, settings.step, growth=_growth(assembly), sizes=sizes)
+    return estimated(run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), sizes=sizes)
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
@@ -113,11 +113,11 @@ def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Sett
         return rerun(settings)
 
 
-def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
+def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
     return Series(times, {name: channels[name][2] for name in names})
 
 
-def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
+def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
     """Sizes by which errors of the enforced moment and force are divided. They come from the chassis' inertia, as
     moment and force may be zero.
     """
@@ -129,16 +129,16 @@ def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
     return sizes
 
 
-def _growth(assembly: Assembly) -> dict[str, float]:
+def _pitch_error_growth(assembly: Assembly) -> dict[str, float]:
     """Ratio of the rms pitch error over a whole run to that over its first part: a free vehicle under wheel forces
     tilts ever faster.
     """
     if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
         return {}
     from models.drift.growth import pitch_variance
-    from models.systems.pitch_plane.trust import growth
+    from models.systems.pitch_plane.trust import pitch_error_growth
 
-    forces = growth(assembly)
+    forces = pitch_error_growth(assembly)
     grown = np.asarray(pitch_variance(forces.times, forces.sinh_rate, 1.0))
     part = max(2, round(FINE_WINDOW * len(grown)))
     return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:part])))}
@@ -161,17 +161,17 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
     return round(ratio)
 
 
-def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
+def output_channels(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
     """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
 
     ``model`` is the model that made the run; effects that need accelerations compute them with it.
     """
     channels: Channels = {}
-    for i, (name, meaning) in enumerate(zip(STATES, MEANINGS, strict=True)):
+    for i, (name, meaning) in enumerate(zip(STATES, MEANINGS_OF_STATES, strict=True)):
         unit = "rad" if name == "pitch" else "m"
         channels[name] = (unit, meaning, run.states[:, i])
         channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
-    channels |= _forces(assembly, run, _inputs(assembly, run.times))
+    channels |= _forces(assembly, run, _inputs_at_times(assembly, run.times))
     for output in assembly.outputs:
         channels |= output(assembly, run.times, run.states)
     for sensor in assembly.sensors:
@@ -180,7 +180,7 @@ def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> 
     return channels
 
 
-def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
+def _inputs_at_times(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
     """The input at the saved times, sampled on a uniform grid or, for adaptive engines, time by time."""
     if assembly.input is None:
         return None
@@ -225,7 +225,7 @@ def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) 
     return forces[:, 0], forces[:, 1]
 
 
-def summary(result: Result) -> dict[str, Any]:
+def channel_summary(result: Result) -> dict[str, Any]:
     """Largest magnitude and rms of every channel, with its unit."""
     return {
         str(name): {

@@ -10,17 +10,17 @@ from pydantic import Field
 
 from models.core.assumptions import Assumption
 from models.core.errors import InputError
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.result import Result
 from models.core.steps import divides, fitting
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
-from models.systems.pitch_plane.assumptions import watching
+from models.systems.pitch_plane.assumptions import watch_function
 from models.systems.pitch_plane.scene import Scene
 
 SEED = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
 PATH = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
-SLACK = 1e-6
+INSTANT_TOLERANCE = 1e-6
 """Part of a period by which a row may lie beside its instant; a run's times are whole numbers of steps."""
 NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, which must divide the sampling period"
 
@@ -51,7 +51,7 @@ def check_end(scene: Scene, place: str, file: str, end: float) -> None:
 
 def instant_numbers(times: np.ndarray, rate: float) -> np.ndarray:
     """Number (n,) of the sensor's last sampling time at or before each of the times (n,) in s."""
-    return np.floor(times * rate + SLACK).astype(np.int64)
+    return np.floor(times * rate + INSTANT_TOLERANCE).astype(np.int64)
 
 
 def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
@@ -60,16 +60,16 @@ def read_samples(times: np.ndarray, values: np.ndarray, rate: float, scene: Scen
     Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
     """
     number = instant_numbers(times, rate)
-    row = np.searchsorted(times, (number - SLACK) / rate)
-    if np.abs(times[row] * rate - number).max() > SLACK:
+    row = np.searchsorted(times, (number - INSTANT_TOLERANCE) / rate)
+    if np.abs(times[row] * rate - number).max() > INSTANT_TOLERANCE:
         raise InputError(scene.file, place, rate, NO_ROW)
     return values[row]
 
 
-def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
+def noisy_reading(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
     """The sampled reading with white noise on each sample; ``p`` has sampling_rate, deviation, seed and path."""
     number = instant_numbers(times, p.sampling_rate)
-    noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
+    noise = p.deviation * normal_samples(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
     return read_samples(times, values, p.sampling_rate, scene, place) + noise[number]
 
 
@@ -78,7 +78,7 @@ def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: flo
     sensor.
     """
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
-    return Assumption(f"{effect} in range", says, remedy, watching(**channels), unit, -limit, limit)
+    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -limit, limit)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:
@@ -88,7 +88,9 @@ def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -
     Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
     """
     spacing = float(result.times[1] - result.times[0])
-    if not divides(spacing, 1 / rate) or not np.allclose(np.diff(result.times), spacing, rtol=SLACK, atol=0):
+    if not divides(spacing, 1 / rate) or not np.allclose(
+        np.diff(result.times), spacing, rtol=INSTANT_TOLERANCE, atol=0
+    ):
         raise InputError(path, "sampling rate", rate, f"the result's rows, {spacing:g} s apart, do not fit its period")
     stride = round(1 / (rate * spacing))
     rows = {name: (result.data[channel].attrs["units"], result[channel][::stride]) for name, channel in columns.items()}

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import legal, module_of, read_tables
+from models.core.scene_effects import check_combination, module_of, read_tables
 from models.core.scene_file import SceneFile, checked, existing, parse
 from models.core.steps import MOST_STEPS, divides, fitting
-from models.core.strict import Query, Strict, accepted, quantity, read
+from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
@@ -20,13 +20,13 @@ from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
 from models.vehicles.pitch_plane import STATE_NAMES
 
-SETS = Path(pitch_plane.__file__).with_name("parameters")
+PARAMETER_SET_FOLDER = Path(pitch_plane.__file__).with_name("parameters")
 """Folder of the published parameter sets."""
 
 
 def parameter_sets() -> tuple[str, ...]:
     """Names of the published parameter sets."""
-    return tuple(sorted(path.stem for path in SETS.glob("*.py") if path.stem != "__init__"))
+    return tuple(sorted(path.stem for path in PARAMETER_SET_FOLDER.glob("*.py") if path.stem != "__init__"))
 
 
 class VehicleTable(Strict):
@@ -35,7 +35,7 @@ class VehicleTable(Strict):
     parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
     geometry: Geometry = Field(default="exact", description="sin and cos of pitch, or linearised")
     override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class RunTable(Strict):
@@ -100,15 +100,15 @@ def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
     return import_module(f"models.vehicles.parameters.{name}").PARAMETERS
 
 
-SMALLEST = 1e-9
+SMALLEST_PARAMETER = 1e-9
 """No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
 
 
 def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
     """Refuse parameters without a static equilibrium, in which every run begins."""
     for name, value in p:
-        if 0 < value < SMALLEST:
-            allowed = f"too small for a vehicle: at least {SMALLEST:g}"
+        if 0 < value < SMALLEST_PARAMETER:
+            allowed = f"too small for a vehicle: at least {SMALLEST_PARAMETER:g}"
             raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
     try:
         rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
@@ -133,7 +133,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
     return scene.model_copy(update={"effects": effects})
 
 
-def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
+def changed_scene(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
     """The scene with some values changed; ``tables`` gives them by the names of the scene's tables."""
     table = scene.table()
     tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
@@ -200,17 +200,17 @@ def settings_of(scene: Scene, engine: str) -> Settings:
     )
 
 
-def assemble(scene: Scene) -> Assembly:
+def assembly_of_scene(scene: Scene) -> Assembly:
     """Assemble the vehicle with the effects that the scene names; only the modules of these effects are imported."""
     p = scene.vehicle_parameters()
     vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
-    assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
+    assembly = Assembly(scene, vehicle, p, "free", None, _initial_state(scene, p))
     for name in effects_in_order(scene):
         assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
     return assembly
 
 
-def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
     """Initial state: the static equilibrium, except for the coordinates that the scene sets."""
     state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
     for name, value in scene.start.items():
@@ -223,7 +223,7 @@ def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
 def effects_in_order(scene: Scene) -> list[str]:
     """The scene's effects, each after those that it needs; refuses illegal combinations."""
     modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
-    legal(modules, scene)
+    check_combination(modules, scene)
     done: list[str] = []
     waiting = list(modules)
     while waiting:

@@ -15,15 +15,15 @@ from models.core.strict import Strict, quantity, read
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.trust import GrowthCurve
 from models.systems.pitch_plane.virtual_measurement import (
-    PAPER,
+    PAPER_FACTORS,
     check_road,
-    follower,
+    follower_builder,
     measure,
-    perturbed,
+    perturbed_parameters,
     write_measurement,
 )
 
-DRIFT = 0.05
+DRIFT_OFF_PITCH = 0.05
 """A run has drifted off when its pitch is this far (rad) from the measured one."""
 
 
@@ -48,14 +48,14 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
     return options
 
 
-def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
+def measurement_and_runs(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
     """The measurement, the standard deviation (N) of the forces' noise, and by name the scenes of runs on the measured
     files. ``error`` requests the error of the measurement's steps.
     """
     options, measured = options_of(scene), measure(scene, error)
     deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
-    vehicle, follow = scene.vehicle_parameters(), follower(scene, folder)
-    paper = perturbed(vehicle)
+    vehicle, follow = scene.vehicle_parameters(), follower_builder(scene, folder)
+    paper = perturbed_parameters(vehicle)
     noises = [
         {"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}} for i in range(options.noise_samples)
     ]
@@ -64,7 +64,9 @@ def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, f
     scenes["perturbed"] = follow(paper, {})
     for i in range(options.perturbed_models):  # Fig. 7
         factors = np.random.Generator(np.random.Philox(key=[options.seed, i])).uniform(0.9, 1.1, 5).tolist()
-        scenes[f"model {i + 1}"] = follow(perturbed(vehicle, dict(zip(PAPER, factors, strict=True))), {})
+        scenes[f"model {i + 1}"] = follow(
+            perturbed_parameters(vehicle, dict(zip(PAPER_FACTORS, factors, strict=True))), {}
+        )
     scenes["both"] = follow(paper, noises[0])
     guide = {"prescribed_pitch": {"file": "pitch.csv"}}
     guided = {"undisturbed": ({}, {}), "noisy": ({}, noises[0]), "perturbed": (paper, {}), "both": (paper, noises[0])}
@@ -77,12 +79,12 @@ def error(measured_run: Result, run: Result, channel: str) -> np.ndarray:
     return run[channel] - np.interp(run.times, measured_run.times, measured_run[channel])
 
 
-def row(engine: str, name: str, measured_run: Result, run: Result) -> dict[str, Any]:
+def figures_of_run(engine: str, name: str, measured_run: Result, run: Result) -> dict[str, Any]:
     """Drift-off time (s, None if never), heave error, and for a guided run the enforced moment and the inertia term."""
     figures: dict[str, Any] = {
         "engine": engine,
         "run": name,
-        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passes(DRIFT),
+        "drift-off": GrowthCurve(run.times, np.abs(error(measured_run, run, "pitch"))).passing_time(DRIFT_OFF_PITCH),
         "heave error": float(np.abs(error(measured_run, run, "z3")).max()),
     }
     if "enforced_moment" in run.data:

@@ -14,36 +14,36 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
-from models.core.noise import PITCH_SENSOR, normal
+from models.core.noise import PITCH_SENSOR, normal_samples
 from models.core.result import Result
 from models.core.strict import Strict, quantity, read
 from models.core.time_series import write_time_series
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.drift.score import (
-    CHANNELS,
     COARSEST_SPACING,
     FEWEST_ROWS,
-    TUMBLED,
+    SECTION_FORCE_CHANNELS,
+    TUMBLING_PITCH,
     Limits,
     blind_verdict,
-    consistent,
-    errors,
+    errors_of_run,
     figures_of_run,
+    innovations_are_consistent,
     uncertainty,
-    verdict,
+    verdict_on_run,
 )
-from models.fatigue.damage import SLOPE
+from models.fatigue.damage import WOEHLER_SLOPE
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble, changed
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, changed_scene
 from models.systems.pitch_plane.trust import predict_trust
 from models.systems.pitch_plane.virtual_measurement import (
-    PAPER,
+    PAPER_FACTORS,
     check_road,
     check_steps,
-    follower,
+    follower_builder,
     measure,
-    perturbed,
-    stride,
+    perturbed_parameters,
+    steps_per_sample,
     write_measurement,
 )
 from models.vehicles.pitch_plane import Parameters
@@ -51,7 +51,7 @@ from models.vehicles.pitch_plane import Parameters
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
 
-DAMPING = 0.7
+DAMPING_RATIO = 0.7
 """Damping ratio of springs and high-pass filters."""
 
 
@@ -62,7 +62,7 @@ class Options(Strict):
     noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
     angle_deviation: float = quantity("rad", "white noise on each measured pitch", default=math.radians(0.1))
     inertia_deviation: float = quantity("", "share by which the filter lets the inertia be wrong", default=0.05)
-    factors: dict[str, float] = Field(PAPER, description="what the model's parameters are multiplied by")
+    factors: dict[str, float] = Field(PAPER_FACTORS, description="what the model's parameters are multiplied by")
     seed: int = Field(1, ge=0, lt=2**63, description="seed of force and pitch noise")
     bandwidth: float = quantity("Hz", "of the prescribed measured pitch", default=15.0)
     stiffnesses: list[float] = Field([50.0, 100.0, 300.0, 1e4], min_length=1, description="springs, N m/rad")
@@ -74,7 +74,7 @@ class Options(Strict):
     grade: float | None = Field(
         None, gt=-0.5, lt=0.5, description="slope angle of the second road", json_schema_extra={"unit": "rad"}
     )
-    slope: float = quantity("", "Woehler exponent", default=SLOPE)
+    slope: float = quantity("", "Woehler exponent", default=WOEHLER_SLOPE)
     limits: Limits = Limits()
 
 
@@ -98,7 +98,7 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
             if not 0.0 < value < math.inf:
                 raise InputError(scene.file, f"options.{name}", value, "must be above 0 and finite")
     for on_road in roads(scene, options).values():
-        assemble(on_road)
+        assembly_of_scene(on_road)
     return options
 
 
@@ -110,7 +110,7 @@ def roads(scene: Scene, options: Options) -> dict[str, Scene]:
     if "grade" in road:
         allowed = "this study puts the road on options.grade itself: drop this key"
         raise InputError(scene.file, "effects.road.grade", road["grade"], allowed)
-    return {"road": scene, "grade": changed(scene, effects={"road": {**road, "grade": options.grade}})}
+    return {"road": scene, "grade": changed_scene(scene, effects={"road": {**road, "grade": options.grade}})}
 
 
 def compare(
@@ -145,12 +145,12 @@ class Bench:
         self.truth, period = measure(scene, error), 1.0 / options.sampling_rate
         self.results = {f"measurement ({road})": self.truth}
         self.deviation = options.noise_fraction * write_measurement(self.truth, self.folder, period)
-        self._write_sensors(stride(scene, options.sampling_rate), period)
-        self.override = perturbed(scene.vehicle_parameters(), options.factors)
-        self.follow = follower(scene, self.folder)
+        self._write_sensors(steps_per_sample(scene, options.sampling_rate), period)
+        self.override = perturbed_parameters(scene.vehicle_parameters(), options.factors)
+        self.follow = follower_builder(scene, self.folder)
         self.parameters = self.follow(self.override, {}).vehicle_parameters()
-        self.methods = self._methods()
-        predicted = predict_trust(assemble(self._scene({})), options.limits.pitch_error)
+        self.methods = self._effects_of_methods()
+        predicted = predict_trust(assembly_of_scene(self._scene({})), options.limits.pitch_error)
         assert predicted is not None  # nothing holds a free run
         self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
         self.holding = holding_stiffness(self.parameters, predicted.rate)
@@ -158,32 +158,33 @@ class Bench:
     def _write_sensors(self, stride: int, period: float) -> None:
         """Write files of the noisy pitch, and of the exact heave and pitch."""
         heave, pitch = self.truth["z3"][::stride], self.truth["pitch"][::stride]
-        noise = normal(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
+        noise = normal_samples(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
         noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
         write_time_series(self.folder / "measured_pitch.csv", noisy, period)
         both = {"z3": ("m", heave), "pitch": ("rad", pitch)}
         write_time_series(self.folder / "heave_and_pitch.csv", both, period)
 
     @property
-    def resisting(self) -> float:
+    def pitch_inertia(self) -> float:
         """Inertia I + J in kg m^2 that a moment on the pitch has to turn."""
-        return rigid_pitch(self.parameters).total
+        return rigid_pitch(self.parameters).total_inertia
 
-    def spring(self, stiffness: float) -> dict[str, float]:
+    def spring_settings(self, stiffness: float) -> dict[str, float]:
         """Settings of a spring to the ground, with a damper of fixed damping ratio."""
-        return {"stiffness": stiffness, "damping": 2.0 * DAMPING * math.sqrt(stiffness * self.resisting)}
+        return {"stiffness": stiffness, "damping": 2.0 * DAMPING_RATIO * math.sqrt(stiffness * self.pitch_inertia)}
 
-    def _methods(self) -> dict[str, dict[str, Any]]:
+    def _effects_of_methods(self) -> dict[str, dict[str, Any]]:
         """Effects of each method by its name, in addition to forces and noise."""
         options, noisy = self.options, "measured_pitch.csv"
         sure = {"file": noisy, "pitch_deviation": options.angle_deviation, "force_deviation": self.deviation}
         filtered = {**sure, "inertia_deviation": options.inertia_deviation}
         smoothed = {"file": noisy, "bandwidth": options.bandwidth}
-        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring(k)} for k in options.stiffnesses}
+        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring_settings(k)} for k in options.stiffnesses}
         stiffest = max(options.stiffnesses)
-        banded = {"pitch_spring": {**self.spring(stiffest), "dead_band": options.dead_band}}
+        banded = {"pitch_spring": {**self.spring_settings(stiffest), "dead_band": options.dead_band}}
         passes = {
-            f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING}} for f in options.cut_offs
+            f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING_RATIO}}
+            for f in options.cut_offs
         }
         return {
             "free": {},
@@ -208,13 +209,13 @@ class Bench:
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
             progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
-            of_method = self._scored(engine, name, effects, failed)
+            of_method = self._rows_of_run(engine, name, effects, failed)
             rows += of_method
             if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
-                rows += [row for other in other_engines for row in self._scored(other, name, effects, failed)]
+                rows += [row for other in other_engines for row in self._rows_of_run(other, name, effects, failed)]
         return rows
 
-    def _scored(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
+    def _rows_of_run(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
         """One row of figures, or none if the run fails."""
         start = time.perf_counter()
         try:
@@ -237,16 +238,22 @@ class Bench:
     def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
         """Figures and verdicts of a run; a run that tumbled gets no damage ratios, which would mislead."""
         limits = self.options.limits
-        figures, wrong = figures_of_run(result, self.parameters), errors(result, self.truth, self.options.slope)
-        with_truth = verdict(figures, wrong, effects, limits)
+        figures, wrong = figures_of_run(result, self.parameters), errors_of_run(result, self.truth, self.options.slope)
+        with_truth = verdict_on_run(figures, wrong, effects, limits)
         alone = blind_verdict(
-            figures, effects, float(result.times[-1]), limits, self.trusted, consistent(result), uncertainty(result)
+            figures,
+            effects,
+            float(result.times[-1]),
+            limits,
+            self.trusted,
+            innovations_are_consistent(result),
+            uncertainty(result),
         )
-        loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
-        loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
+        loads = {f"damage {channel}": wrong.damage[channel] for channel in SECTION_FORCE_CHANNELS}
+        loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in SECTION_FORCE_CHANNELS}
         return {
             "method": name,
-            **(dict.fromkeys(loads) if figures.pitch_max > TUMBLED else loads),
+            **(dict.fromkeys(loads) if figures.pitch_max > TUMBLING_PITCH else loads),
             **{f"vertical damage {name}": ratio for name, ratio in wrong.vertical_damage.items()},
             "pitch error max [rad]": wrong.pitch_max,
             "pitch error rms [rad]": wrong.pitch_rms,
@@ -270,11 +277,11 @@ class Bench:
         """
         rows = []
         for stiffness in self.options.sweep:
-            cut_off = math.sqrt(stiffness / self.resisting) / (2.0 * math.pi)
-            high_pass = {"high_pass": {"cut_off": cut_off, "damping_ratio": DAMPING}}
+            cut_off = math.sqrt(stiffness / self.pitch_inertia) / (2.0 * math.pi)
+            high_pass = {"high_pass": {"cut_off": cut_off, "damping_ratio": DAMPING_RATIO}}
             sprung, passed = (
-                errors(self.simulate("reference", effects), self.truth, self.options.slope)
-                for effects in ({"pitch_spring": self.spring(stiffness)}, high_pass)
+                errors_of_run(self.simulate("reference", effects), self.truth, self.options.slope)
+                for effects in ({"pitch_spring": self.spring_settings(stiffness)}, high_pass)
             )
             worst = max(sprung.damage.values(), key=lambda ratio: abs(math.log(ratio)))
             rows.append((stiffness, sprung.pitch_max, passed.pitch_max, worst))

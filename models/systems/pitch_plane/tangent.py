@@ -27,10 +27,10 @@ from models.machine.compiled import named_closure
 from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
 
-STEP = 1e-3
+LONGEST_STEP = 1e-3
 """Longest step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs one below 4 ms."""
 
-SMALL = 1e-6
+MODEL_DIFFERENCE_SHARE = 1e-6
 """Part of a wrong model's difference that its derivative is taken over: errors of two parameters must not multiply,
 or a stiffness that is wrong together with the inertia would leave a moment that no run has."""
 
@@ -51,7 +51,7 @@ class StageForces(NamedTuple):
 
 
 @register_jitable
-def jacobian(y, u, p, body, flat, x, dx):
+def jacobian_product(y, u, p, body, flat, x, dx):
     """Compute dx = A x, where A is the Jacobian at the state y (8,) under the wheel forces u (2,); ``flat`` : linear
     geometry.
     """
@@ -73,7 +73,7 @@ def jacobian(y, u, p, body, flat, x, dx):
 
 
 @register_jitable
-def pushed(y, p, body, du, dx):
+def add_force_errors(y, p, body, du, dx):
     """Add to the rates dx (8,) the effect of the errors du (2,) in N of the wheel forces."""
     sine, cosine = (math.sin(y[3]), math.cos(y[3])) if body else (0.0, 1.0)
     dx[4] -= cosine * du[0] / p[2]
@@ -102,12 +102,12 @@ def _step_of(rhs, body, flat):
             if wrong:
                 rhs(stage, u, other, off)
                 for q in range(8):
-                    off[q] = (off[q] - k[s, q]) / SMALL
+                    off[q] = (off[q] - k[s, q]) / MODEL_DIFFERENCE_SHARE
             for j in range(columns):
                 for q in range(8):
                     stage_x[q] = x[j, q] + part * kx[s - 1, j, q]
-                jacobian(stage, u, p, body, flat, stage_x, kx[s, j])
-                pushed(stage, p, body, e[j], kx[s, j])
+                jacobian_product(stage, u, p, body, flat, stage_x, kx[s, j])
+                add_force_errors(stage, p, body, e[j], kx[s, j])
                 for q in range(8):
                     kx[s, j, q] += off[q]
         for q in range(8):
@@ -160,7 +160,7 @@ class TangentPath:
         return self.per_sample * self.samples
 
     @property
-    def inputs(self) -> np.ndarray:
+    def forces_at_stages(self) -> np.ndarray:
         """The wheel forces (rows, 2) in N at the stages of all steps."""
         if self.forces.held:
             return self.forces.sample(0.0, self.step, self.steps)
@@ -168,13 +168,13 @@ class TangentPath:
 
     def given(self, errors: np.ndarray) -> StageForces:
         """The wheel forces at the stages of all steps, together with their errors (rows, m, 2) in N."""
-        return StageForces(self.step, self.inputs, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
+        return StageForces(self.step, self.forces_at_stages, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
 
     def march(self, compile_march: Any):
         """The compiled march for the mode and geometry of the assembly."""
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
-    def carry(
+    def carry_errors(
         self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Path (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the columns begin with ``columns`` (m, 8).
@@ -183,7 +183,7 @@ class TangentPath:
         wrong_parameters : the parameters of a wrong model, whose error forces every column.
         """
         count, p = self.steps, self.assembly.parameters.array()
-        wrong = p if wrong_parameters is None else p + SMALL * (wrong_parameters.array() - p)
+        wrong = p if wrong_parameters is None else p + MODEL_DIFFERENCE_SHARE * (wrong_parameters.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         self.march(compile_carry)(
@@ -197,7 +197,7 @@ class TangentPath:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(assembly: Assembly, longest: float = STEP) -> TangentPath:
+def path_of(assembly: Assembly, longest: float = LONGEST_STEP) -> TangentPath:
     """The path of a free force-excited run; raises ValueError for a run of another kind."""
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
@@ -207,7 +207,7 @@ def path_of(assembly: Assembly, longest: float = STEP) -> TangentPath:
     return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
 
 
-def tilted(assembly: Assembly) -> np.ndarray:
+def tilt_error_columns(assembly: Assembly) -> np.ndarray:
     """Two initial error columns (2, 8): a tilt of 1 rad and a tilt rate of 1 rad/s of the rigid vehicle with its
     wheels.
 
@@ -225,7 +225,7 @@ def tilt_map(path: TangentPath) -> np.ndarray:
     The slow error has no damping, so that the determinant of the exact map is 1. Its difference from 1 measures how
     much of the fast motion is in the four numbers.
     """
-    _, columns = path.carry(tilted(path.assembly))
+    _, columns = path.carry_errors(tilt_error_columns(path.assembly))
     return columns[-1][:, [3, 7]].T
 
 
@@ -241,7 +241,7 @@ def measured_growth(path: TangentPath) -> tuple[float, float]:
     return float(np.log(np.abs(np.linalg.eigvals(tilting)).max())) / duration, math.sqrt(off) / duration
 
 
-def swing(path: TangentPath) -> float:
+def slow_swing_frequency(path: TangentPath) -> float:
     """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
     half = 0.5 * float(np.trace(tilt_map(path)))
     return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0
@@ -262,7 +262,7 @@ class CovarianceOverTime:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> CovarianceOverTime:
+def covariance(assembly: Assembly, deviation: float, longest: float = LONGEST_STEP) -> CovarianceOverTime:
     """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
     (N) per sample.
 

@@ -16,31 +16,40 @@ import numpy as np
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.core.signals import Sampled, Smooth
-from models.drift.growth import MEDIAN, growth_rate, pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
+from models.drift.growth import (
+    MEDIAN_OF_NORMAL,
+    growth_rate,
+    pitch_rate_of_forces,
+    pitch_variance,
+    rigid_pitch,
+    sinh_law_rate,
+)
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.tangent import STEP, TangentPath, path_of
+from models.systems.pitch_plane.tangent import LONGEST_STEP, TangentPath, path_of
 from models.vehicles.pitch_plane import Parameters
 
 if TYPE_CHECKING:
     from models.measured.axle_forces import AxleForces
 
-ANGLE = 0.05
+UNTRUSTED_PITCH = 0.05
 """A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
-LEAST = 8
+FEWEST_SAMPLES = 8
 """Samples that a quintic spline needs, with two to spare."""
 
 
-SMALL = 0.2
+SMALL_PITCH = 0.2
 """rad: the laws are of small errors, and right to 5 % up to here (Monte Carlo)."""
 
 
 def small_errors(angle: float) -> Assumption:
     """Assumption that ``angle``, up to which a run is trusted, is small enough for the laws of growth."""
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
-    return Assumption("small errors", says, remedy, partial(_allowed, angle), "rad", most=SMALL)
+    return Assumption(
+        "small errors", says, remedy, partial(_watched_allowed_error, angle), "rad", upper_limit=SMALL_PITCH
+    )
 
 
-def _allowed(angle: float, run: Result) -> Watched:
+def _watched_allowed_error(angle: float, run: Result) -> Watched:
     return {"allowed error": np.array([angle])}
 
 
@@ -64,25 +73,25 @@ class GrowthCurve:
     times: np.ndarray
     size: np.ndarray
 
-    def passes(self, angle: float = ANGLE) -> float | None:
+    def passing_time(self, angle: float = UNTRUSTED_PITCH) -> float | None:
         """First time (s) at which the error exceeds ``angle`` (rad), None if it never does."""
         beyond = ~(self.size <= angle)  # what is not a number any more has
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
 
-def growth(assembly: Assembly) -> Growth:
+def pitch_error_growth(assembly: Assembly) -> Growth:
     """Growth of a pitch error along a free force-excited run; raises ValueError for a run of another kind."""
     path = path_of(assembly)
     times = path.forces.period * np.arange(path.samples + 1)
     if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
         return Growth(times, 0.0, np.zeros(len(times)))
-    values, p = _covering(path), assembly.parameters
+    values, p = _covering_samples(path), assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
     arguments = (rate, path.forces.period, p)
     return Growth(times, growth_rate(*arguments), sinh_law_rate(*arguments))
 
 
-def _covering(path: TangentPath) -> np.ndarray:
+def _covering_samples(path: TangentPath) -> np.ndarray:
     """Samples (n + 1, 2) of the run's wheel forces; if held samples end with the run, the last one is repeated."""
     values = path.forces.values[: path.samples + 1]
     return values if len(values) > path.samples else np.vstack([values, values[-1:]])
@@ -90,9 +99,11 @@ def _covering(path: TangentPath) -> np.ndarray:
 
 def noise(assembly: Assembly, deviation: float) -> GrowthCurve:
     """Pitch error from white noise of ``deviation`` (N) on each force sample: median of its size over noise paths."""
-    growing, period = growth(assembly), path_of(assembly).forces.period
-    intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
-    return GrowthCurve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity)))
+    growing, period = pitch_error_growth(assembly), path_of(assembly).forces.period
+    intensity = rigid_pitch(assembly.parameters).noise_intensity(deviation, period)
+    return GrowthCurve(
+        growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, intensity))
+    )
 
 
 def interpolation_error(path: TangentPath) -> np.ndarray:
@@ -103,21 +114,21 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     f'' T^2 / 12. Held ones first of all delay the whole run by T / 2, which is no drift: they are judged by the
     spline as late as that, and err by -f'' T^2 / 24 on average.
     """
-    spline = Smooth(_covering(path), path.forces.period, degree=5)
-    count, given = path.steps, path.inputs
+    spline = Smooth(_covering_samples(path), path.forces.period, degree=5)
+    count, given = path.steps, path.forces_at_stages
     late = path.forces.period / 2 if path.forces.held else 0.0
     true = spline.sample(-late, path.step / 2, 2 * count + 1)
     read = [given] * 3 if path.forces.held else [given[0:-1:2], given[1::2], given[2::2]]
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation(assembly: Assembly, longest: float = STEP) -> GrowthCurve:
+def interpolation(assembly: Assembly, longest: float = LONGEST_STEP) -> GrowthCurve:
     """Pitch error from the interpolation between samples alone; 0 for a run with too few samples to estimate it."""
     path = path_of(assembly, longest)
-    return _growth_by_parameters(path, interpolation_error(path) if path.samples >= LEAST else None)
+    return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
-def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> GrowthCurve:
+def model_error_curve(assembly: Assembly, wrong_parameters: Parameters, longest: float = LONGEST_STEP) -> GrowthCurve:
     """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
@@ -135,19 +146,19 @@ def _growth_by_parameters(
     path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
 ) -> GrowthCurve:
     pushes = None if errors is None else errors[:, None, :]
-    _, columns = path.carry(np.zeros((1, 8)), pushes, wrong_parameters)
+    _, columns = path.carry_errors(np.zeros((1, 8)), pushes, wrong_parameters)
     return GrowthCurve(path.times, np.abs(columns[:, 0, 3]))
 
 
-def rounding(assembly: Assembly) -> GrowthCurve:
+def rounding_error_curve(assembly: Assembly) -> GrowthCurve:
     """Pitch error from rounding alone, median of its size: each step rounds the pitch rate anew. No solver can do
     better.
     """
-    growing, path = growth(assembly), path_of(assembly)
-    rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
+    growing, path = pitch_error_growth(assembly), path_of(assembly)
+    rate = pitch_rate_of_forces(_covering_samples(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
     return GrowthCurve(
-        growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, each**2 / path.step))
+        growing.times, MEDIAN_OF_NORMAL * np.sqrt(pitch_variance(growing.times, growing.sinh_rate, each**2 / path.step))
     )
 
 
@@ -156,13 +167,13 @@ class Trust:
     """Times (s) at which each source of error ends the trust in a run, None where it does not; ``rate`` in 1/s,
     ``angle`` in rad.
 
-    unchecked : what was not looked at, with what would show it.
+    unchecked_text : what was not looked at, with what would show it.
     """
 
     times: dict[str, float | None]
     rate: float
     angle: float
-    unchecked: str = ""
+    unchecked_text: str = ""
 
     @property
     def until(self) -> tuple[str, float] | None:
@@ -172,14 +183,17 @@ class Trust:
 
     def __str__(self) -> str:
         """The line that describes this trust in a plan."""
-        grown, rest = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s", self.unchecked and f"; {self.unchecked}"
+        grown, rest = (
+            f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s",
+            self.unchecked_text and f"; {self.unchecked_text}",
+        )
         if self.until is None:
             return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
         name, time = self.until
         return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
 
 
-def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
+def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust | None:
     """Time for which a scene's run can be trusted, and the reason. None for a run that is guided, held, or on a road:
     its errors do not grow.
     """
@@ -189,14 +203,14 @@ def predict_trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
     except ValueError:
         return None
     assert isinstance(forces, Sampled | Smooth)
-    times = {"interpolation between the samples": interpolation(assembly).passes(angle)}
+    times = {"interpolation between the samples": interpolation(assembly).passing_time(angle)}
     added = assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:
         named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
-        times[named] = noise(assembly, added.deviation).passes(angle)
+        times[named] = noise(assembly, added.deviation).passing_time(angle)
     times |= _steady_drift_time(assembly, angle)
-    times["rounding"] = rounding(assembly).passes(angle)
-    return Trust(times, growth(assembly).rate, angle, _unchecked(assembly))
+    times["rounding"] = rounding_error_curve(assembly).passing_time(angle)
+    return Trust(times, pitch_error_growth(assembly).rate, angle, _unchecked_sentence(assembly))
 
 
 def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
@@ -212,7 +226,7 @@ def _steady_drift_time(assembly: Assembly, angle: float) -> dict[str, float]:
     return {
         name: math.sqrt(2 * way / abs(acceleration))
         for (name, way), acceleration, seen in zip(
-            ways.items(), motion.accelerations.tolist(), motion.seen, strict=True
+            ways.items(), motion.accelerations.tolist(), motion.is_beyond_uncertainty, strict=True
         )
         if seen
     }
@@ -223,12 +237,12 @@ def _axles(assembly: Assembly) -> "AxleForces":
     from models.measured.axle_forces import AxleForces
 
     path, turn = path_of(assembly), assembly.mode == "force-body"
-    forces, lasts = _covering(path), assembly.scene.run.duration
+    forces, lasts = _covering_samples(path), assembly.scene.run.duration
     return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turn=turn)
 
 
-def _unchecked(assembly: Assembly) -> str:
+def _unchecked_sentence(assembly: Assembly) -> str:
     """Sentence on the properties of wheel forces from a file that were not checked."""
-    from models.measured.axle_forces import unchecked
+    from models.measured.axle_forces import unchecked_delay_sentence
 
-    return unchecked(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""
+    return unchecked_delay_sentence(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

@@ -12,27 +12,27 @@ from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble, build
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
 from models.vehicles.pitch_plane import STATE_NAMES, Parameters
 
-PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
+PAPER_FACTORS = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 """The perturbed model of Appendix B, as factors on the parameters."""
-LEAST = 8
+FEWEST_SAMPLES = 8
 """Samples that a spline through the measured pitch needs."""
 
-MEASURING = ("road", "lift_off")
+MEASURING_EFFECTS = ("road", "lift_off")
 """Effects that the measurement may have; the runs on its files have no tyres."""
-PRESCRIBED = {
+PRESCRIBED_STATES = {
     "prescribed_heave_and_pitch": ("z3", "z3_rate", "pitch", "pitch_rate"),
     "prescribed_pitch": ("pitch", "pitch_rate"),
 }
 """States that an effect takes from its own file."""
 
-Follow = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
+BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Builder of a force-excited scene from overrides of parameters and further effects."""
 
 
-def perturbed(p: Parameters, factors: Mapping[str, float] = PAPER) -> dict[str, float]:
+def perturbed_parameters(p: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
     """Changed parameters by name: each is the value in ``p`` times its factor."""
     return {name: getattr(p, name) * factor for name, factor in factors.items()}
 
@@ -45,7 +45,7 @@ def measure(scene: Scene, error: bool = False) -> Result:
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
     """Refuse a scene that is no virtual measurement, or with which a run on its measured forces is impossible."""
     for name in scene.effects:
-        if name not in MEASURING:
+        if name not in MEASURING_EFFECTS:
             allowed = "this study measures on a road and names the effects of the other runs itself: drop it"
             raise InputError(scene.file, f"effects.{name}", None, allowed)
     if "road" not in scene.effects:
@@ -53,9 +53,9 @@ def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> 
     if scene.run.output_step is not None:
         allowed = "this study makes its table from every step, and chooses the rows that it saves: drop this key"
         raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
-    stride(scene, sampling_rate)
-    if scene.run.duration * sampling_rate < LEAST:
-        allowed = f"must last at least {LEAST} samples, {LEAST / sampling_rate:g} s"
+    steps_per_sample(scene, sampling_rate)
+    if scene.run.duration * sampling_rate < FEWEST_SAMPLES:
+        allowed = f"must last at least {FEWEST_SAMPLES} samples, {FEWEST_SAMPLES / sampling_rate:g} s"
         raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
     for engine in engines:
         integrator = scene.engines[engine].integrator if engine in scene.engines else None
@@ -76,7 +76,7 @@ def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
             raise InputError(scene.file, f"engines.{engine}.step", step, allowed)
 
 
-def stride(scene: Scene, sampling_rate: float) -> int:
+def steps_per_sample(scene: Scene, sampling_rate: float) -> int:
     """Number of steps of the measurement between samples."""
     ratio = 1.0 / (sampling_rate * scene.run.step)
     if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
@@ -101,15 +101,15 @@ def write_measurement(measured_run: Result, folder: Path, period: float) -> floa
     return float(max(np.abs(front).max(), np.abs(rear).max()))
 
 
-def follower(scene: Scene, folder: Path) -> Follow:
+def follower_builder(scene: Scene, folder: Path) -> BuildFollower:
     """Return a function that builds scenes on the files in ``folder``; their runs start in the state of the
     measurement.
     """
-    initial = dict(zip(STATE_NAMES, assemble(scene).initial.tolist(), strict=True))
+    initial = dict(zip(STATE_NAMES, assembly_of_scene(scene).initial.tolist(), strict=True))
     parameters = scene.vehicle_parameters().model_dump()
 
     def follow(override: Mapping[str, float], effects: Mapping[str, Any]) -> Scene:
-        prescribed = next((states for effect, states in PRESCRIBED.items() if effect in effects), ())
+        prescribed = next((states for effect, states in PRESCRIBED_STATES.items() if effect in effects), ())
         table = {
             "title": scene.title,
             "vehicle": {"geometry": scene.vehicle.geometry, "override": {**parameters, **override}},

@@ -18,20 +18,20 @@ from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import NO_LIMITS, Curve, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import linearise
 
-SMALL = 0.3
+SMALL_ANGLE = 0.3
 """rad: where sines are taken for angles they may be so large: 1.5 % of the sine."""
-TRAVEL = 0.1
+LARGEST_TRAVEL = 0.1
 """m: suspensions of road vehicles meet a stop at about so much travel."""
-SLIP = 0.07
+LARGEST_SLIP_ANGLE = 0.07
 """rad (4 degrees): side forces of tyres grow in proportion to slip angles up to about so much."""
-PUSHES = 1.0
+PULL_LIMIT = 1.0
 """N: a tyre that pulls by less is at its edge."""
-SHORTEST, LONGEST = 0.1, 100.0
+SHORTEST_WAVE, LONGEST_WAVE = 0.1, 100.0
 """m: waves of the road's standard spectra (ISO 8608: 0.01 to 10 cycles/m); a contact patch swallows shorter ones."""
-GAUSSIAN = 0.1
+LEFT_OUT_SHARE = 0.1
 """Share of an output's variance that gains may leave out: beyond, its distribution is no Gaussian one any more."""
 IN_TIME = "use the study ride_nonlinear"
-UPRIGHT = 0.7
+LEAST_UPRIGHT_COSINE = 0.7
 """Cosine of a spring's direction with the vertical from which it is a suspension."""
 
 
@@ -47,33 +47,35 @@ def assumptions(
         assert motion is not None
         return motion.of(name)
 
-    whole = [*_tyres(vehicle, of), *_angles(vehicle, of), *_slips(vehicle, of)]
+    whole = [*_tyres(vehicle, of), *_angle_assumptions(vehicle, of), *_slip_assumptions(vehicle, of)]
     for spring in vehicle.springs:
-        whole += _curves(scene, spring, of) if spring.bent else _travels(scene, vehicle, spring, of)
-    whole += [*_waves(scene, vehicle), *_seat_assumptions(scene)]
+        whole += (
+            _curve_assumptions(scene, spring, of) if spring.bent else _travel_assumptions(scene, vehicle, spring, of)
+        )
+    whole += [*_wave_assumptions(scene, vehicle), *_seat_assumptions(scene)]
     return [*whole, *([NEARLY_GAUSSIAN] if replaced else [])]
 
 
-Of = Callable[[str], np.ndarray | Gaussian]
+ValuesByName = Callable[[str], np.ndarray | Gaussian]
 
 
-def _tyres(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+def _tyres(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
     loads = static_loads(vehicle)
     if not loads or vehicle.lifts:
         return
 
     def watched(run: Result) -> Watched:
-        return {f"tyre {name}": _raised(of(f"load {name}"), load) for name, load in loads.items()}
+        return {f"tyre {name}": _raised_by(of(f"load {name}"), load) for name, load in loads.items()}
 
     remedy = f'{IN_TIME} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
-    yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", least=-PUSHES)
+    yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _raised(values: np.ndarray | Gaussian, by: float) -> np.ndarray | Gaussian:
+def _raised_by(values: np.ndarray | Gaussian, by: float) -> np.ndarray | Gaussian:
     return replace(values, mean=values.mean + by) if isinstance(values, Gaussian) else values + by
 
 
-def _angles(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+def _angle_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
     turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
     if turning:
         names = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
@@ -83,12 +85,12 @@ def _angles(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
             "take a smoother road or a slower speed: ride is small motion",
             lambda run: {f"{names[f]} of {body}": of(f"{f} {body}") for body, f in turning},
             "rad",
-            -SMALL,
-            SMALL,
+            -SMALL_ANGLE,
+            SMALL_ANGLE,
         )
 
 
-def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+def _slip_assumptions(vehicle: SpatialVehicle, of: ValuesByName) -> Iterator[Assumption]:
     if vehicle.side_forces:
         yield Assumption(
             "small slip",
@@ -96,18 +98,20 @@ def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
             "use the system handling, whose tyres saturate",
             lambda run: {f"side force {force.name}": of(f"slip {force.name}") for force in vehicle.side_forces},
             "rad",
-            -SLIP,
-            SLIP,
+            -LARGEST_SLIP_ANGLE,
+            LARGEST_SLIP_ANGLE,
         )
 
 
-def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
+def _travel_assumptions(
+    scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: ValuesByName
+) -> Iterator[Assumption]:
     """Assumption that the linear spring between a wheel and the body that it carries stays within its free travel."""
     wheels = {tyre.body for tyre in vehicle.tyres}
     ends = {spring.first_body, spring.second_body}
-    if abs(spring.axis[2]) < UPRIGHT or None in ends or not ends & wheels:
+    if abs(spring.axis[2]) < LEAST_UPRIGHT_COSINE or None in ends or not ends & wheels:
         return
-    free = float(scene.options.get("free_travel") or TRAVEL)
+    free = float(scene.options.get("free_travel") or LARGEST_TRAVEL)
     yield Assumption(
         f"free travel of {spring.name}",
         f"the suspension {spring.name} meets no stop",
@@ -119,7 +123,7 @@ def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of
     )
 
 
-def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
+def _curve_assumptions(scene: RideScene, spring: SpringDamper, of: ValuesByName) -> Iterator[Assumption]:
     """Assumption on a nonlinear spring: its motion stays within the straight piece about rest if slopes at rest are
     used, else within its tables.
     """
@@ -127,7 +131,7 @@ def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumpti
         friction = spring.friction and kind == "rate" and scene.vehicle.small_motion
         if curve is None and not friction:
             continue
-        low, high = _range(curve, scene.vehicle.small_motion)
+        low, high = _curve_range(curve, scene.vehicle.small_motion)
         if friction:
             low, high = max(low, -spring.friction_rate), min(high, spring.friction_rate)
         straight = (
@@ -150,7 +154,7 @@ def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumpti
         )
 
 
-def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
+def _curve_range(curve: Curve | None, small: bool) -> tuple[float, float]:
     """Ends of a curve's table or, for small motion, of the straight piece about rest."""
     if curve is None:
         return -np.inf, np.inf
@@ -164,13 +168,13 @@ def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
     return float(max(bent[bent < 0.0], default=-np.inf)), float(min(bent[bent > 0.0], default=np.inf))
 
 
-def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
+def _wave_assumptions(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
     """Assumptions that, at constant speeds, the road waves that excite wheels and body have wavelengths for which
     spectra of roads are known. A drive is slow only at its start.
     """
     if scene.road.file is not None or vehicle.limits:
         return
-    hop, bounce = swings(vehicle)
+    hop, bounce = tyre_mode_frequencies(vehicle)
     speeds = scene.speeds.all() if scene.speeds is not None else np.array(scene.drive.speed if scene.drive else [0.0])
     slow, fast = float(speeds.min()), float(speeds.max())
 
@@ -180,19 +184,19 @@ def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
         return wheels | body
 
     if hop or bounce:
-        least = f"from {SHORTEST * hop:.2g} " if hop else ""
+        least = f"from {SHORTEST_WAVE * hop:.2g} " if hop else ""
         yield Assumption(
             "waves of the road",
             "waves that swing wheels and body are as long as those of which spectra of roads are known",
-            f"take speeds {least}to {LONGEST * bounce:.2g} m/s, or a measured road",
+            f"take speeds {least}to {LONGEST_WAVE * bounce:.2g} m/s, or a measured road",
             watched,
             "m",
-            SHORTEST,
-            LONGEST,
+            SHORTEST_WAVE,
+            LONGEST_WAVE,
         )
 
 
-def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
+def tyre_mode_frequencies(vehicle: SpatialVehicle) -> tuple[float, float]:
     """Highest frequency (Hz) of motions that deform mostly the tyres, 0 if there are none, and lowest frequency of all
     oscillations, infinite if there are none.
     """
@@ -227,7 +231,7 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
         "take a smoother road or a slower speed: no effect lets them leave the seat",
         watched,
         "m/s^2",
-        least=-GRAVITY,
+        lower_limit=-GRAVITY,
     )
 
 
@@ -247,5 +251,5 @@ NEARLY_GAUSSIAN = Assumption(
         )
     },
     "",
-    most=GAUSSIAN,
+    upper_limit=LEFT_OUT_SHARE,
 )

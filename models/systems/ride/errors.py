@@ -10,22 +10,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.core.discretisation import Estimate, stated
+from models.core.discretisation import Estimate, with_stated_errors
 from models.core.errors import InputError
 from models.core.result import Result
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
 from models.ride.sweep import Sweep
-from models.ride.weighting import weighted
+from models.ride.weighting import system_with_weightings
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import Linear
 from models.vehicles.linear_vehicle import LinearVehicle
 
-CHECKED = 3
+CHECKED_SPEEDS = 3
 """Speeds of a sweep that are solved again."""
-DIGIT, CORNERED = 4.0 * float(np.finfo(float).eps), 1e-11
+MATRIX_ACCURACY, CORNERED_LAW_ACCURACY = 4.0 * float(np.finfo(float).eps), 1e-11
 """Relative accuracy of matrices: of formulas and of an engine's smooth laws, and of an engine's curves with corners."""
-SAFETY = 2.0
+SAFETY_FACTOR = 2.0
 """One draw of last digits may change little by chance."""
 
 
@@ -37,14 +37,14 @@ def with_changed_last_digits(vehicle: LinearVehicle, accuracy: float, draw: int 
 
     return replace(
         vehicle,
-        mass=_symmetric(changed(vehicle.mass)),
+        mass=_symmetrised(changed(vehicle.mass)),
         damping=changed(vehicle.damping),
         stiffness=changed(vehicle.stiffness),
         road_stiffness=changed(vehicle.road_stiffness),
     )
 
 
-def _symmetric(matrix: np.ndarray) -> np.ndarray:
+def _symmetrised(matrix: np.ndarray) -> np.ndarray:
     return (matrix + matrix.T) / 2.0
 
 
@@ -52,31 +52,41 @@ def with_error_of_sweep(
     run: Result, swept: Sweep, linear: Linear, roads: Mapping[str, Excitation], filters: Mapping[str, str], digit: float
 ) -> Result:
     """The result with the rounding errors of its standard deviations, estimated at some speeds on all roads."""
-    at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED).round().astype(int))
+    at = np.unique(np.linspace(0, len(swept.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
     recomputed = np.array(
-        [[_direct(linear, road, filters, float(swept.speeds[i]), digit) for i in at] for road in roads.values()]
+        [
+            [_deviations_of_changed(linear, road, filters, float(swept.speeds[i]), digit) for i in at]
+            for road in roads.values()
+        ]
     )
     deviation = swept.deviation[:, at]
     told = {}
     for i, (name, unit) in enumerate(zip(swept.outputs, swept.units, strict=True)):
         known = np.isfinite(deviation[..., i]) & np.isfinite(recomputed[..., i])
-        size = rms(deviation[..., i][known])
+        size = finite_rms(deviation[..., i][known])
         if size > 0.0:
-            error = max(SAFETY * rms(recomputed[..., i][known] - deviation[..., i][known]), DIGIT / 4.0 * size)
+            error = max(
+                SAFETY_FACTOR * finite_rms(recomputed[..., i][known] - deviation[..., i][known]),
+                MATRIX_ACCURACY / 4.0 * size,
+            )
             told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
-    return stated(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
+    return with_stated_errors(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
 
 
-def _direct(linear: Linear, road: Excitation, filters: Mapping[str, str], speed: float, digit: float) -> np.ndarray:
+def _deviations_of_changed(
+    linear: Linear, road: Excitation, filters: Mapping[str, str], speed: float, digit: float
+) -> np.ndarray:
     """Standard deviations (outputs,) of the vehicle with changed last digits; nan where it has none."""
-    system = weighted(excited(with_changed_last_digits(linear(speed), digit), road, speed), filters)
+    system = system_with_weightings(
+        vehicle_with_road(with_changed_last_digits(linear(speed), digit), road, speed), filters
+    )
     try:
-        return stationary(system).deviation
+        return stationary_covariance(system).deviation
     except InputError:
         return np.full(len(system.names), np.nan)
 
 
-def rms(values: np.ndarray) -> float:
+def finite_rms(values: np.ndarray) -> float:
     """Root mean square of values, 0 if there are none."""
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -4,30 +4,40 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from models.core.discretisation import Estimate, Series, by_chance, estimated, observed_order, of_chance, stated
+from models.core.discretisation import (
+    Estimate,
+    Series,
+    by_chance,
+    estimated,
+    observed_order,
+    of_chance,
+    with_stated_errors,
+)
 from models.core.result import Result
 from models.ride.nonlinear_copies import Copies, coarser_variances
 from models.ride.speed_profile import SpeedProfile
 from models.ride.statistical_linearisation import StatisticallyLinear
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, VaryingSpeed, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.errors import rms
+from models.systems.ride.errors import finite_rms
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
-ORDER = 10
+DRIVE_ORDER = 10
 """Of a drive's points in path."""
-APART = ", each speed by itself"
+SPEED_BY_SPEED = ", each speed by itself"
 COPIES_ORDER = 4
 LEAST_LEFT = 0.25
 """Error of a deviation, at least, by the share of its variance that gains leave out."""
 
-Alone = Callable[[int], np.ndarray]
+DeviationsAtConstantSpeed = Callable[[int], np.ndarray]
 """Deviations (time, outputs) as if each speed had always been driven, by every so many of the speeds that are known."""
 
 
-def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
+def with_error_of_drive(
+    run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: DeviationsAtConstantSpeed
+) -> Result:
     """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
     its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly.
     """
@@ -38,7 +48,9 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
 
     def series(time: np.ndarray, deviation: np.ndarray, each: np.ndarray) -> Series:
         channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
-        apart = {f"{name}{APART}": each[:, i] for i, name in enumerate(drive.names) if np.isfinite(each[:, i]).all()}
+        apart = {
+            f"{name}{SPEED_BY_SPEED}": each[:, i] for i, name in enumerate(drive.names) if np.isfinite(each[:, i]).all()
+        }
         return Series(time, channels | apart)
 
     def rerun(times: float, share: float) -> Series:
@@ -53,9 +65,9 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
         return series(coarse.time[rows], coarse.deviation[rows], alone(every)[::every][: len(wanted)])
 
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
-    units |= {f"{name}{APART}": unit for name, unit in units.items()}
+    units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    return estimated(run, fine, rerun, ORDER, step)
+    return estimated(run, fine, rerun, DRIVE_ORDER, step)
 
 
 def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
@@ -91,7 +103,7 @@ def with_error_of_copies(
             told[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
     if equivalents:
         told |= _of_gains(equivalents, copies, units)
-    stated(run, told, "the copies in longer steps, and gains beside copies")
+    with_stated_errors(run, told, "the copies in longer steps, and gains beside copies")
     scatter = {
         f"{name}, copies": by_chance(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
         for i, name in enumerate(first.names)
@@ -134,6 +146,6 @@ def _of_gains(
     for i, name in enumerate(beside[0][1].names):
         known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])
         if known.any():
-            error, size = rms(errors[known, i]), rms(gains[known, i])
+            error, size = finite_rms(errors[known, i]), finite_rms(gains[known, i])
             told[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
     return told

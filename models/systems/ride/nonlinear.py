@@ -23,9 +23,9 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.store import Arrays
 from models.ensemble.workers import Crew
-from models.ride.covariance import stationary
-from models.ride.excited import excited
-from models.ride.nonlinear_copies import Copies, copies_in_time, followed
+from models.ride.covariance import stationary_covariance
+from models.ride.excited import vehicle_with_road
+from models.ride.nonlinear_copies import Copies, copies_in_time, longest_resolving_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import StatisticallyLinear, statistically_linear
 from models.road.excitation import Excitation
@@ -33,12 +33,12 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import MotionInRun, Spectral, few_speeds, watching
+from models.systems.ride.watched import MotionInRun, Spectral, few_speeds, watched_vehicle
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 
-STEP = 2e-3
+LONGEST_STEP = 2e-3
 """Longest step (s) of the engines' runs; steep springs want a shorter one."""
 Progress = Callable[[str, float], None]
 
@@ -65,28 +65,28 @@ class Nonlinear:
     """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
     Monte Carlo copies if the scene requests them.
 
-    shown : the statistically linearised vehicle at the speed of the engines' runs; lifts : whether tyres may lift,
-    which they do in Monte Carlo alone.
+    shown : the statistically linearised vehicle at the speed of the engines' runs; tyres_may_lift : whether tyres may
+    lift, which they do in Monte Carlo alone.
     """
 
     speeds: np.ndarray
-    small: np.ndarray
-    replaced: list[StatisticallyLinear]
+    small_motion: np.ndarray
+    linearised_vehicles: list[StatisticallyLinear]
     copies: dict[float, Copies]
     shown: StatisticallyLinear
-    lifts: bool = False
+    tyres_may_lift: bool = False
 
     def of(self, name: str) -> np.ndarray:
         """One quantity (N, p) of the statistically linearised vehicles, by its name."""
-        return np.array([getattr(each, name) for each in self.replaced])
+        return np.array([getattr(each, name) for each in self.linearised_vehicles])
 
     @property
     def deviation(self) -> np.ndarray:
         """Standard deviations (N, p) by statistical linearisation."""
-        return np.array([each.covariance.deviation for each in self.replaced])
+        return np.array([each.covariance.deviation for each in self.linearised_vehicles])
 
 
-def linearised(
+def linearised_result(
     scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress, error: bool = False
 ) -> Result:
     """Small motion and statistical linearisation at all speeds, and Monte Carlo at some; the result's detail is
@@ -100,14 +100,14 @@ def linearised(
     small, replaced = [], []
     for i, speed in enumerate(speeds):
         progress("statistical linearisation", 0.3 * i / len(speeds))
-        small.append(stationary(excited(linear(speed), road, speed)).deviation)
+        small.append(stationary_covariance(vehicle_with_road(linear(speed), road, speed)).deviation)
         replaced.append(statistically_linear(on_road, road, speed))
     shown = sampling.shown(speeds)
     beside = sampling.beside or [shown]
-    copies = _copies(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
+    copies = _copies_by_speed(scene, CopiesBySpeed(vehicle, road, tuple(beside), sampling), progress)
     at_shown = statistically_linear(on_road, road, shown)
     linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
-    by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small}
+    by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small_motion}
     by_speed |= {part: linear_runs.of(part) for part in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
@@ -125,7 +125,7 @@ def linearised(
             "speed_of_copies": Channel("speed_of_copies", list(copies), "m/s"),
         },
         engine="reference",
-        counts={"iterations": sum(len(each.changes) for each in replaced)},
+        counts={"iterations": sum(len(each.gain_changes) for each in replaced)},
         seconds=time.process_time() - begun,
         detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
@@ -161,7 +161,7 @@ class CopiesBySpeed:
         return {}
 
 
-def _copies(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
+def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -> dict[float, Copies]:
     """Monte Carlo copies by their speed (m/s), computed by the scene's worker processes."""
 
     def tell(state: Done) -> None:
@@ -214,8 +214,8 @@ def in_engine(
     """
     assert scene.speeds is not None
     speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    path = road_path(road, speed, min(sampling.step or STEP, followed(vehicle, speed)))
-    begun, every, skipped = time.process_time(), max(1, round(2.0 * STEP / path.step)), sampling.skipped
+    path = road_path(road, speed, min(sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))
+    begun, every, skipped = time.process_time(), max(1, round(2.0 * LONGEST_STEP / path.step)), sampling.skipped
     if table is None:
         table = path.table(int(np.ceil(sampling.driven / path.step)), sampling.seed)
     ride = ride_over(engine, vehicle, path, table, skipped=skipped, every=every)
@@ -234,15 +234,15 @@ def in_engine(
         speed=speed,
         step=path.step,
     )
-    at, seen = ride.rows, watching(linearise(vehicle, speed), vehicle, speed)
+    at, seen = ride.rows, watched_vehicle(linearise(vehicle, speed), vehicle, speed)
     motion = MotionInRun(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
     with_assumptions(labelled, assumptions(scene, vehicle, motion))
     return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
 
 
-ORDER, APART = 4, 16
+RUNGE_KUTTA_ORDER, ROWS_APART = 4, 16
 """Order of the classical Runge-Kutta method; steps from one row to the next by which errors are told."""
-REPEATED, LATEST = 0.9, 0.1
+REPEATED_SHARE, FIRST_ROW_SHARE = 0.9, 0.1
 """Shares of a run that longer steps repeat, for rows are read beside, and before which the first row lies."""
 
 
@@ -252,23 +252,23 @@ def _with_error_of_steps(
     """The result with the errors of its outputs, by runs in steps twice and four times as long on the same road."""
     names, units = [str(name) for name in run["output"]], run["unit"].tolist()
     steps = len(table) // 2
-    first = APART * int(min(skipped / path.step, LATEST * steps) / APART)
+    first = ROWS_APART * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / ROWS_APART)
 
     def series(ride: Ride, begin: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
         return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
     def rerun(times: float, share: float) -> Series:
-        longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
-        count = int(REPEATED * share * steps / times)
+        longer, every = replace(path, half=times * path.half), max(1, round(ROWS_APART / times) if times <= 2.0 else 8)
+        count = int(REPEATED_SHARE * share * steps / times)
         read = table[:: round(times)] if times >= 1.0 else _road_at_half_spacing(table)
         begin = first * path.step
         ride = ride_over(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
         return series(ride, begin)
 
-    outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
+    outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, ROWS_APART))
     fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
-    return estimated(run, fine, rerun, ORDER, path.step)
+    return estimated(run, fine, rerun, RUNGE_KUTTA_ORDER, path.step)
 
 
 def _road_at_half_spacing(table: np.ndarray) -> np.ndarray:
@@ -315,7 +315,7 @@ class Ride:
         return f[shown], density[shown]
 
 
-def ridden(
+def drive_over_road(
     engine: str,
     vehicle: SpatialVehicle,
     road: RoadPath,
@@ -337,16 +337,16 @@ def ridden(
 def ride_over(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, every: int = 1
 ) -> Ride:
-    """Drive over the road whose heights are in ``table``; otherwise as ``ridden``."""
+    """Drive over the road whose heights are in ``table``; otherwise as ``drive_over_road``."""
     check_rates(vehicle, road.excitation)
     steps = len(table) // 2
-    model = _model(engine, vehicle, road, table)
+    model = _engine_model(engine, vehicle, road, table)
     run = model.run()
     at = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
-    return _read(model, vehicle, road, table, run, at)
+    return _outputs_at_steps(model, vehicle, road, table, run, at)
 
 
-def _model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> SpatialModel:
+def _engine_model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> SpatialModel:
     settings = Settings(INTEGRATORS[engine], road.step, len(table) // 2 * road.step)
     return build(engine, vehicle, settings, road.speed, table)
 
@@ -355,10 +355,10 @@ def read_outputs(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, step_numbers: np.ndarray
 ) -> Ride:
     """Outputs of a run at steps (m,) other than those at which they were read."""
-    return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
+    return _outputs_at_steps(_engine_model(engine, vehicle, road, table), vehicle, road, table, run, step_numbers)
 
 
-def _read(
+def _outputs_at_steps(
     model: SpatialModel,
     vehicle: SpatialVehicle,
     road: RoadPath,

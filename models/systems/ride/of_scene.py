@@ -7,12 +7,12 @@ from math import copysign
 from typing import TYPE_CHECKING
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended
+from models.core.scene_effects import extended_by_effects
 from models.own_model.scene_vehicle import scene_vehicle
 from models.road.excitation import Excitation
 from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
-from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.road.two_track import TwoTrackRoad, half_track, on_track, road_excitation, road_of_level
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
@@ -25,9 +25,9 @@ GRAVITY = 9.81
 """m/s^2, where a scene's operating point is the loaded one."""
 Linear = Callable[[float], LinearVehicle]
 """A linear vehicle at a speed (m/s)."""
-CLOSED = "ride"
+CLOSED_FORM_STUDY = "ride"
 """The study that reads reduced vehicles, by their closed form."""
-BESIDE = 1.0
+ONE_TRACK_OFFSET = 1.0
 """Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
 
 
@@ -50,7 +50,7 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
     the vehicle, so that their moments about z would turn it back or further. InputError also for a tyre that may lift
     where small motion is requested.
     """
-    vehicle = _built(scene).vehicle
+    vehicle = _built_vehicle(scene).vehicle
     if vehicle.lifts and scene.vehicle.small_motion:
         allowed = "in small motion no wheel leaves the road: leave it out beside effects.lift_off"
         raise InputError(scene.file, "vehicle.small_motion", True, allowed)
@@ -60,9 +60,11 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
     return replace(vehicle, gravity=GRAVITY if scene.vehicle.operating_point == "loaded" else 0.0)
 
 
-def _built(scene: RideScene) -> Built:
-    file, reduced = scene.vehicle.file, scene.study == CLOSED
-    return extended(Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene)
+def _built_vehicle(scene: RideScene) -> Built:
+    file, reduced = scene.vehicle.file, scene.study == CLOSED_FORM_STUDY
+    return extended_by_effects(
+        Built(scene_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene
+    )
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
@@ -143,7 +145,7 @@ def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:
     """Distance (m) of the road's tracks from the centre line."""
     if scene.road.file is not None:
         return scene.road.track_width / 2.0
-    return scene.road.half_track or half_track(wheels) or BESIDE
+    return scene.road.half_track or half_track(wheels) or ONE_TRACK_OFFSET
 
 
 def excitation_of(
@@ -155,12 +157,12 @@ def excitation_of(
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
     try:
-        heights = excitation(road_of(scene, wheels), placed, left_right, front_rear)
+        heights = road_excitation(road_of(scene, wheels), placed, left_right, front_rear)
     except InputError as error:
         if error.file:
             raise
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
-    for change in _built(scene).road if scene.effects else ():
+    for change in _built_vehicle(scene).road if scene.effects else ():
         heights = change(heights)
     return heights
 

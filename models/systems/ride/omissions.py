@@ -11,15 +11,15 @@ from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import slopes_at_rest
 
-LIGHT = 0.2
+LIGHT_BODY_SHARE = 0.2
 """A body that is not a wheel counts as light up to this share of the whole mass."""
-ALIKE = 2.0
+SIMILAR_STIFFNESS_FACTOR = 2.0
 """Stiffnesses apart by no more than this factor are of one sort of bushing."""
 ALL_WHEELS = "mass of all wheels"
 TYRE_DAMPING = "tyre damping"
-LAWS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
+LAW_TEXTS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
 """Laws of springs, and what leaving out those of all springs is called: stops, bent dampers, dry friction."""
-less, on_road = ReducedScene.less, ReducedScene.on_road
+less, on_road = ReducedScene.reduced_further, ReducedScene.on_road
 
 
 def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
@@ -30,7 +30,7 @@ def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
     tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
     effects = {name: find(scene) for name, find in SORTS.items()}
     effects |= {
-        name: [Effect(name, partial(_without_table, name=name), table.COST, singular=True, has_table=True)]
+        name: [Effect(name, partial(_without_table, name=name), table.COST, is_singular=True, has_table=True)]
         for name, table in tables.items()
     }
     return tuple(
@@ -85,17 +85,17 @@ def body_mass(scene: ReducedScene) -> list[Effect]:
         needs = (TYRE_DAMPING,) if white else ()
         why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
         says = f"{', '.join(bodies)} without mass"
-        return Effect(name, partial(less, massless=bodies), says, needs, excludes, why, singular=True)
+        return Effect(name, partial(less, massless=bodies), says, needs, excludes, why, is_singular=True)
 
     effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
     effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
     others = wheels | {body.parent for body in vehicle.bodies}
-    most = LIGHT * sum(body.mass for body in vehicle.bodies)
+    most = LIGHT_BODY_SHARE * sum(body.mass for body in vehicle.bodies)
     light = [body.name for body in vehicle.bodies if body.name not in others and body.mass < most]
     return [*effects, *(effect(f"mass of {name}", [name], ()) for name in light)]
 
 
-def bushings(scene: ReducedScene) -> list[Effect]:
+def rigid_bushing_effects(scene: ReducedScene) -> list[Effect]:
     """Making bushings at wheels rigid: one effect per group of similar stiffness, for springs that are stiffer than the
     softest one between the same two bodies.
     """
@@ -107,11 +107,11 @@ def bushings(scene: ReducedScene) -> list[Effect]:
         spring
         for springs in pairs.values()
         for spring in springs
-        if _stiffness(spring) > ALIKE * min(map(_stiffness, springs))
+        if _stiffness(spring) > SIMILAR_STIFFNESS_FACTOR * min(map(_stiffness, springs))
     ]
     sorts: list[list[SpringDamper]] = []
     for spring in sorted(stiff, key=_stiffness):
-        if sorts and _stiffness(spring) <= ALIKE * _stiffness(sorts[-1][0]):
+        if sorts and _stiffness(spring) <= SIMILAR_STIFFNESS_FACTOR * _stiffness(sorts[-1][0]):
             sorts[-1].append(spring)
         else:
             sorts.append([spring])
@@ -135,25 +135,25 @@ def _rigid_bushings(springs: list[SpringDamper]) -> Effect:
     )
 
 
-def curves(scene: ReducedScene) -> list[Effect]:
+def linear_law_effects(scene: ReducedScene) -> list[Effect]:
     """Replacing nonlinear laws by gains: one effect per law that any spring has, unless small motion replaces the laws
     anyway.
     """
     return [
-        Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", singular=True)
-        for law, name in LAWS.items()
+        Effect(name, partial(less, straight=[law]), f"{name}: the gains of statistical linearisation", is_singular=True)
+        for law, name in LAW_TEXTS.items()
         if not scene.ride.vehicle.small_motion and any(getattr(spring, law) for spring in scene.vehicle.springs)
     ]
 
 
-def delay(scene: ReducedScene) -> list[Effect]:
+def delay_effects(scene: ReducedScene) -> list[Effect]:
     """Leaving out the delay from front to rear: one effect, where axles follow one another."""
     follows = len(scene.vehicle.axles) > 1 and scene.ride.road.front_rear == "delayed"
     equal = Effect("delay front to rear", partial(on_road, front_rear="equal"), "all axles meet the same at once")
     return [equal] if follows else []
 
 
-def freedoms(scene: ReducedScene) -> list[Effect]:
+def locked_freedom_effects(scene: ReducedScene) -> list[Effect]:
     """Locking degrees of freedom: one effect per freedom of a body without tyres, and one per sort of freedom of the
     bodies with tyres.
     """
@@ -165,12 +165,12 @@ def freedoms(scene: ReducedScene) -> list[Effect]:
         elif freedom != "z":
             shared[f"wheels {freedom}"].append((body, freedom))
     return [
-        Effect(name, partial(less, locked=group), f"locked: {', '.join(map(' '.join, group))}", singular=True)
+        Effect(name, partial(less, locked=group), f"locked: {', '.join(map(' '.join, group))}", is_singular=True)
         for name, group in (*groups.items(), *shared.items())
     ]
 
 
-def mounts(scene: ReducedScene) -> list[Effect]:
+def rigid_mount_effects(scene: ReducedScene) -> list[Effect]:
     """Making mounts rigid: one effect per pair of bodies that springs connect, if neither carries a tyre."""
     wheels, pairs = wheels_of(scene.vehicle), defaultdict[tuple[str, str], list[str]](list)
     for spring in scene.vehicle.springs:
@@ -205,16 +205,16 @@ def second_track(scene: ReducedScene) -> list[Effect]:
     if not wide or scene.ride.road.left_right != "modelled":
         return []
     says = "left and right meet the same"
-    return [Effect("second track", partial(on_road, left_right="equal"), says, singular=True)]
+    return [Effect("second track", partial(on_road, left_right="equal"), says, is_singular=True)]
 
 
 def tyre_damping(scene: ReducedScene) -> list[Effect]:
     """Leaving out the damping of tyres: one effect, where any tyre is damped."""
     damped = any(tyre.damping for tyre in scene.vehicle.tyres)
-    return [Effect(TYRE_DAMPING, _undamped, "tyres are springs without damping")] if damped else []
+    return [Effect(TYRE_DAMPING, _without_damping, "tyres are springs without damping")] if damped else []
 
 
-def _undamped(scene: ReducedScene) -> ReducedScene:
+def _without_damping(scene: ReducedScene) -> ReducedScene:
     tyres = tuple(replace(tyre, damping=0.0) for tyre in scene.vehicle.tyres)
     return replace(scene, vehicle=replace(scene.vehicle, tyres=tyres))
 
@@ -224,11 +224,11 @@ SORTS: dict[str, Callable[[ReducedScene], list[Effect]]] = {
     for find in (
         anti_roll_bars,
         body_mass,
-        bushings,
-        curves,
-        delay,
-        freedoms,
-        mounts,
+        rigid_bushing_effects,
+        linear_law_effects,
+        delay_effects,
+        locked_freedom_effects,
+        rigid_mount_effects,
         second_corner,
         second_track,
         tyre_damping,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
@@ -93,12 +93,12 @@ def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
     yield "  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)
     frequencies = "frequencies depend on the speed"
     if not (vehicle.side_forces or vehicle.drags):
-        frequencies = f"undamped {', '.join(f'{f:.3g}' for f in undamped(vehicle))} Hz"
+        frequencies = f"undamped {', '.join(f'{f:.3g}' for f in undamped_frequencies(vehicle))} Hz"
     yield "freedoms", f"{len(vehicle.coordinates())}, {frequencies}"
-    yield from (("question", text) for text in doubts(vehicle))
+    yield from (("question", text) for text in frequency_doubts(vehicle))
 
 
-def undamped(vehicle: SpatialVehicle) -> list[float]:
+def undamped_frequencies(vehicle: SpatialVehicle) -> list[float]:
     """Natural frequencies (Hz) of the vehicle without damping, side forces and drag; 0 for motions without a restoring
     force.
     """
@@ -110,23 +110,27 @@ def undamped(vehicle: SpatialVehicle) -> list[float]:
     return [float(f) for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)]
 
 
-USUAL = (0.2, 500.0)
+USUAL_FREQUENCIES = (0.2, 500.0)
 """Hz: frequencies of road vehicles, from a soft body to the stiffest mount."""
-FREE = 1e-4
+FREE_FREQUENCY = 1e-4
 """Hz: what is slower is nothing but a motion that is free."""
 
 
-def doubts(vehicle: SpatialVehicle) -> list[str]:
+def frequency_doubts(vehicle: SpatialVehicle) -> list[str]:
     """A question where the vehicle has natural frequencies that no road vehicle has, as happens with values that are
     not in SI units.
     """
-    odd = [f for f in undamped(vehicle) if f > FREE and not USUAL[0] <= f <= USUAL[1]]
+    odd = [
+        f
+        for f in undamped_frequencies(vehicle)
+        if f > FREE_FREQUENCY and not USUAL_FREQUENCIES[0] <= f <= USUAL_FREQUENCIES[1]
+    ]
     if not odd:
         return []
     listed = ", ".join(f"{f:.3g}" for f in odd[:4])
     return [
         f"is every value in SI units (kg, m, N/m)? Without damping the vehicle has frequencies of {listed} Hz; "
-        f"those of road vehicles lie from {USUAL[0]:g} to {USUAL[1]:g} Hz"
+        f"those of road vehicles lie from {USUAL_FREQUENCIES[0]:g} to {USUAL_FREQUENCIES[1]:g} Hz"
     ]
 
 

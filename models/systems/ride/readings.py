@@ -12,7 +12,7 @@ from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
 
-LONGEST, SHORTEST = 1e-2, 500.0
+LOWEST_WAVENUMBER_SHARE, HIGHEST_WAVENUMBER = 1e-2, 500.0
 """Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
 
 
@@ -25,7 +25,7 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
 
 def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
     """Relative change of every output's deviation if the road is replaced by an isotropic one with the same track
-    spectrum, both up to SHORTEST.
+    spectrum, both up to HIGHEST_WAVENUMBER.
 
     Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
     """
@@ -38,9 +38,13 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
     if not modelled or road.mean.cutoff is not None or len({wheel.y for wheel in placed}) < 2:
         return {}
     linear = linear_vehicle(vehicle)(speed)
-    low = LONGEST * min(f.corner for f in (road.mean, road.roll) if f.corner) if road.mean.corner else 0.01
+    low = (
+        LOWEST_WAVENUMBER_SHARE * min(f.corner for f in (road.mean, road.roll) if f.corner)
+        if road.mean.corner
+        else 0.01
+    )
     of_road, of_isotropic = (
-        variances(linear, partial(spectral_matrix, each, placed), speed, low, SHORTEST)
+        variances(linear, partial(spectral_matrix, each, placed), speed, low, HIGHEST_WAVENUMBER)
         for each in (road, isotropic_like(road, y))
     )
     pairs = zip(linear.names, of_road, of_isotropic, strict=True)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
-from models.core.scene_effects import without as without_own
+from models.core.scene_effects import scene_without as without_own
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import RideScene
@@ -34,7 +34,7 @@ class ReducedScene:
         """Limits by which the vehicle is reduced: massless, rigid and locked parts."""
         return Limits(self.massless, self.rigid, self.locked)
 
-    def less(self, **names: Iterable[object]) -> "ReducedScene":
+    def reduced_further(self, **names: Iterable[object]) -> "ReducedScene":
         """The scene reduced further: names are added to its sets, for example massless = ["wheel"]."""
         return replace(self, **{key: getattr(self, key) | set(more) for key, more in names.items()})
 
@@ -61,9 +61,9 @@ class Effect:
     """Something that may be left out: its name, what leaving it out means, and its relation to other effects.
 
     needs : effects that must be left out as well; excludes : effects that may not be left out together with this one;
-    ``why`` : the reason for both. singular : leaving it out is no small change in any respect, so that it is solved and
-    not screened. has_table : it is a table [effects.NAME], which is removed before all other effects, since it changes
-    the vehicle.
+    ``why`` : the reason for both. is_singular : leaving it out is no small change in any respect, so that it is solved
+    and not screened. has_table : it is a table [effects.NAME], which is removed before all other effects, since it
+    changes the vehicle.
     """
 
     name: str
@@ -72,11 +72,11 @@ class Effect:
     needs: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     why: str = ""
-    singular: bool = False
+    is_singular: bool = False
     has_table: bool = False
 
 
-def illegal(omitted_effects: Iterable[Effect]) -> str:
+def refusal_reason(omitted_effects: Iterable[Effect]) -> str:
     """Reason why these effects may not be left out together, with the remedy; empty where they may."""
     omitted_effects = tuple(omitted_effects)
     names = {effect.name for effect in omitted_effects}
@@ -90,7 +90,7 @@ def illegal(omitted_effects: Iterable[Effect]) -> str:
     return ""
 
 
-def without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
+def reduced_without(scene: ReducedScene, omitted_effects: Iterable[Effect]) -> ReducedScene:
     """The scene without these effects; effects that are tables [effects.NAME] are removed first, all at once."""
     omitted_effects = tuple(omitted_effects)
     if tables := [effect.name for effect in omitted_effects if effect.has_table]:

@@ -14,10 +14,10 @@ import numpy as np
 from models.core.assumptions import with_assumptions
 from models.core.result import Channel, Result, result
 from models.systems.ride.assumptions import assumptions
-from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_sweep
+from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import FEW, MotionAlongDrive, Spectral, few_speeds, own_deviations
+from models.systems.ride.watched import JUDGED_SPEEDS, MotionAlongDrive, Spectral, few_speeds, own_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from models.systems.ride.nonlinear import Progress, Sampling
 
 AS_WRITTEN = "as in the scene"
-ANY = 1.0
+ANY_SPEED = 1.0
 """m/s: the matrices of vehicles that are driven at a varying speed are the same at every one."""
 QUASI_STATIONARY = 90
 """Speeds at which each is taken by itself beside a drive, from standstill on; straight between them."""
@@ -72,7 +72,7 @@ def run(
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
         if engine == "reference":
-            return nonlinear.linearised(scene, vehicle, sampling, progress, error)
+            return nonlinear.linearised_result(scene, vehicle, sampling, progress, error)
         return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
 
 
@@ -82,12 +82,12 @@ def _deviations_by_speed(
     """Standard deviations (correlation, speed, output). Assumptions are judged on the scene's own road, or on the last
     one.
     """
-    from models.ride.sweep import sweep
+    from models.ride.sweep import variance_sweep
 
     assert scene.speeds is not None
     roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in points.correlations.items()}
     begun, linear = time.process_time(), linear_vehicle(vehicle, engine)
-    swept = sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
+    swept = variance_sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
     labelled = result(
         scene,
         {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},
@@ -98,7 +98,7 @@ def _deviations_by_speed(
             "unit": Channel("output", list(swept.units)),
         },
         engine=engine,
-        counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct.values())},
+        counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct_counts.values())},
         seconds=time.process_time() - begun,
         detail=swept,
     )
@@ -108,7 +108,11 @@ def _deviations_by_speed(
     )
     if not error:
         return labelled
-    digit = DIGIT if engine == "reference" or not any(spring.bent for spring in vehicle.springs) else CORNERED
+    digit = (
+        MATRIX_ACCURACY
+        if engine == "reference" or not any(spring.bent for spring in vehicle.springs)
+        else CORNERED_LAW_ACCURACY
+    )
     return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, digit)
 
 
@@ -121,7 +125,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
 
     assert scene.drive is not None
     begun, weightings = time.process_time(), scene.weighting
-    linear, road = linear_vehicle(vehicle, engine)(ANY), excitation_of(scene, wheels(vehicle))
+    linear, road = linear_vehicle(vehicle, engine)(ANY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
     each = quasi_stationary(linear, road, speeds, weightings=weightings)
@@ -148,7 +152,9 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, er
         seconds=time.process_time() - begun,
         detail=drive,
     )
-    apart = Spectral(vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), FEW + 1)[1:]), {})
+    apart = Spectral(
+        vehicle, lambda _: linear, road, few_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
+    )
     with_assumptions(
         labelled, assumptions(scene, vehicle, MotionAlongDrive(own_deviations(vehicle, drive.deviation), apart))
     )

@@ -10,10 +10,10 @@ from models.core.errors import InputError
 from models.core.scene_effects import with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
-from models.core.strict import Query, Strict, accepted, quantity
+from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.ride.speed_profile import SpeedProfile
 from models.road import TRACK_WIDTH
-from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
+from models.road.two_track import MEAN_CORNER, ROLL_CORNER, TRACK_DENSITY_LEVEL
 
 LeftRight = Literal["modelled", "uncorrelated", "equal"]
 FrontRear = Literal["delayed", "uncorrelated", "equal"]
@@ -26,7 +26,7 @@ class RideVehicle(Strict):
     file: str = Field(description="a vehicle that comes with twinrig, a TOML file of your own or a car in MJCF")
     small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
     operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
-    accept: list[Query] = accepted()
+    accept: list[Query] = accepted_queries_field()
 
 
 class Road(Strict):
@@ -37,7 +37,7 @@ class Road(Strict):
     first: float | None = quantity("m", "where along the file to begin", default=None, zero=True)
     last: float | None = quantity("m", "where along the file to end", default=None)
 
-    level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
+    level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=TRACK_DENSITY_LEVEL)
     iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(
         default=None, description="class instead of a level: its mean, one-sided as the standard has it"
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from models.core.assumptions import Gaussian
 from models.core.errors import InputError
-from models.ride.sweep import sweep
+from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import GRAVITY, Linear
 from models.vehicles.kinematics import Kinematics
@@ -20,7 +20,7 @@ from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, Spat
 from models.vehicles.spatial_linear import linearise, outputs, preloads
 
 AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
-FEW = 5
+JUDGED_SPEEDS = 5
 """Speeds at which a sweep is judged, its ends among them."""
 
 
@@ -48,14 +48,14 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     return tuple(whole)
 
 
-def watching(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+def watched_vehicle(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     """A linear vehicle, of any engine, with the outputs of ``watched`` and the slip angles (rad)."""
     seen = replace(vehicle, outputs=watched_outputs(vehicle))
     rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
-    return replace(linear, outputs=(*rows, *_slips(vehicle, rows, speed)))
+    return replace(linear, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
-def _slips(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
+def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
     named = {row.name: row for row in rows}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{part} {force.name}"] for part in ("side velocity", "roll", "yaw"))
@@ -75,7 +75,7 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
 def few_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
     """A few of the speeds (m/s), with the slowest and the fastest among them."""
     rising = np.unique(np.asarray(speeds, float))
-    return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, FEW).round().astype(int))]
+    return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, JUDGED_SPEEDS).round().astype(int))]
 
 
 @dataclass(frozen=True)
@@ -101,30 +101,30 @@ class Spectral:
         rows, names = [], [output.name for output in self._watched_at_speed(self.speeds[0]).outputs]
         for speed in self.speeds:
             try:
-                rows.append(sweep(self._watched_at_speed, {"own": self.road}, [speed]).deviation[0, 0])
+                rows.append(variance_sweep(self._watched_at_speed, {"own": self.road}, [speed]).deviation[0, 0])
             except InputError:
                 rows.append(np.full(len(names), np.nan))
         return dict(zip(names, np.array(rows).T, strict=True))
 
     def _watched_at_speed(self, speed: float) -> LinearVehicle:
-        return watching(self.linear(speed), self.vehicle, speed)
+        return watched_vehicle(self.linear(speed), self.vehicle, speed)
 
 
 @dataclass(frozen=True)
 class MotionAlongDrive:
-    """Motion along a drive. deviations : of the run's own outputs (time, ...); apart : of other outputs, as if each
-    speed had always been driven.
+    """Motion along a drive. deviations : of the run's own outputs (time, ...); speed_by_speed : of other outputs, as if
+    each speed had always been driven.
     """
 
     deviations: Mapping[str, np.ndarray]
-    apart: Spectral
+    speed_by_speed: Spectral
 
     def of(self, name: str) -> Gaussian:
         """Gaussian statistics of the motion of a part, by name: at every instant of a drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
             return Gaussian(np.zeros(len(deviation)), deviation)
-        return self.apart.of(name)
+        return self.speed_by_speed.of(name)
 
 
 def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
@@ -140,13 +140,13 @@ class MotionInRun:
     w).
     """
 
-    seen: LinearVehicle
+    watched_vehicle: LinearVehicle
     positions: np.ndarray
     rates: np.ndarray
     heights: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
         """Values of a motion at every row of the run."""
-        row = {output.name: output for output in self.seen.outputs}[name]
+        row = {output.name: output for output in self.watched_vehicle.outputs}[name]
         road = np.concatenate([row.road_factors, row.road_rate_factors])
         return self.positions @ row.displacement_factors + self.rates @ row.rate_factors + self.heights @ road

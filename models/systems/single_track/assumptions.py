@@ -4,7 +4,7 @@ from models.core.assumptions import Assumption
 from models.systems.single_track.equations import LEAST_LOAD
 from models.systems.single_track.scene import SingleTrackScene
 
-SMALL = 0.35
+SMALL_ANGLE = 0.35
 """rad: angles whose sine is the angle within 2 %."""
 
 
@@ -18,8 +18,8 @@ def assumptions(scene: SingleTrackScene) -> list[Assumption]:
             "use a vehicle on four wheels (system handling)",
             lambda run: {f"{axle} axle": run[f"slip angle {axle}"] for axle in ("front", "rear")},
             "rad",
-            -SMALL,
-            SMALL,
+            -SMALL_ANGLE,
+            SMALL_ANGLE,
         ),
         Assumption(
             "axles stay on the ground",

@@ -21,47 +21,47 @@ from models.machine.compiled import compiled
 GRAVITY = 9.81
 LEAST_LOAD, LEAST_SHARE = 0.05, 0.1
 """Shares: of its static load that an axle keeps, and of its squared friction that is left to the side."""
-TURNED = 0.02
+TURNING_SLIP_WIDTH = 0.02
 """rad of slip angle over which friction goes from that of right turns to that of left ones."""
 
 
 class Axle(NamedTuple):
-    """Tyres of an axle. stiffness : cornering stiffness by load (1/rad); friction; sharpness : n; side : friction in
-    left turns is larger by this share, in right turns smaller; lift : N s^2/m^2; rise : e, share of the stiffness
-    beyond the bend.
+    """Tyres of an axle. stiffness : cornering stiffness by load (1/rad); friction; bend_sharpness : n; side : friction
+    in left turns is larger by this share, in right turns smaller; downforce_coefficient : N s^2/m^2; rise : e, share of
+    the stiffness beyond the bend.
     """
 
     stiffness: float
     friction: float
-    sharpness: float
+    bend_sharpness: float
     side: float
-    lift: float
+    downforce_coefficient: float
     rise: float
 
 
 class Car(NamedTuple):
-    """Parameters of a car in SI units. mass; front, rear : from the centre of mass to the axles; inertia : about the
-    upright; height : of the centre of mass; drag : N s^2/m^2; brake, drive : shares of the front axle in forward forces
-    below and above 0.
+    """Parameters of a car in SI units. mass; front_arm, rear_arm : from the centre of mass to the axles; inertia :
+    about the upright; height : of the centre of mass; drag : N s^2/m^2; front_braking_share, front_driving_share :
+    shares of the front axle in forward forces below and above 0.
     """
 
     mass: float
-    front: float
-    rear: float
+    front_arm: float
+    rear_arm: float
     inertia: float
     height: float
     drag: float
-    brake: float
-    drive: float
+    front_braking_share: float
+    front_driving_share: float
 
 
 @compiled
 def axle_force(axle: Axle, load: float, forward: float, slip_angle: float) -> float:
     """Side force (N, left positive) of an axle under a load (N) and a forward force (N), at a slip angle (rad)."""
-    grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNED))
+    grip = axle.friction * load * (1.0 - axle.side * np.tanh(slip_angle / TURNING_SLIP_WIDTH))
     across = grip * np.sqrt(max(1.0 - (forward / grip) ** 2, LEAST_SHARE))
     x = axle.stiffness * load * slip_angle / across
-    bent = (1.0 + abs(x) ** axle.sharpness) ** (-1.0 / axle.sharpness)
+    bent = (1.0 + abs(x) ** axle.bend_sharpness) ** (-1.0 / axle.bend_sharpness)
     return -across * x * ((1.0 - axle.rise) * bent + axle.rise)
 
 
@@ -72,23 +72,34 @@ def forces(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive
     motion : lateral velocity (m/s) and yaw rate (rad/s); drive : steer angle (rad), speed (m/s), its rate (m/s^2).
     """
     steer, speed, rate = drive
-    base = car.front + car.rear
+    base = car.front_arm + car.rear_arm
     weight, moved, pressure = car.mass * GRAVITY, car.mass * rate * car.height / base, speed * speed
-    load_f, load_r = weight * car.rear / base, weight * car.front / base
-    load_f = max(load_f - moved - front.lift * pressure, LEAST_LOAD * load_f)
-    load_r = max(load_r + moved - rear.lift * pressure, LEAST_LOAD * load_r)
+    load_f, load_r = weight * car.rear_arm / base, weight * car.front_arm / base
+    load_f = max(load_f - moved - front.downforce_coefficient * pressure, LEAST_LOAD * load_f)
+    load_r = max(load_r + moved - rear.downforce_coefficient * pressure, LEAST_LOAD * load_r)
     forward = car.mass * rate + car.drag * pressure
-    ahead = (car.drive if forward > 0.0 else car.brake) * forward
-    angle_f = (motion[0] + car.front * motion[1]) / speed - steer
-    angle_r = (motion[0] - car.rear * motion[1]) / speed
+    ahead = (car.front_driving_share if forward > 0.0 else car.front_braking_share) * forward
+    angle_f = (motion[0] + car.front_arm * motion[1]) / speed - steer
+    angle_r = (motion[0] - car.rear_arm * motion[1]) / speed
     side_f = axle_force(front, load_f, ahead, angle_f)
     side_r = axle_force(rear, load_r, forward - ahead, angle_r)
     turned = side_f + ahead * steer
-    return turned + side_r, car.front * turned - car.rear * side_r, load_f, load_r, side_f, side_r, angle_f, angle_r
+    return (
+        turned + side_r,
+        car.front_arm * turned - car.rear_arm * side_r,
+        load_f,
+        load_r,
+        side_f,
+        side_r,
+        angle_f,
+        angle_r,
+    )
 
 
 @compiled
-def rates(car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]) -> tuple:
+def motion_rates(
+    car: Car, front: Axle, rear: Axle, motion: tuple[float, float], drive: tuple[float, float, float]
+) -> tuple:
     """Rates of lateral velocity (m/s^2) and of yaw rate (rad/s^2)."""
     answer = forces(car, front, rear, motion, drive)
     return answer[0] / car.mass - drive[1] * motion[1], answer[1] / car.inertia
@@ -107,8 +118,8 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
     for i in range(len(inputs) - 1):
         here = inputs[i, 0], inputs[i, 1], inputs[i, 2]
         there = inputs[i + 1, 0], inputs[i + 1, 1], inputs[i + 1, 2]
-        w1, r1 = rates(car, front, rear, (w, r), here)
-        w2, r2 = rates(car, front, rear, (w + step * w1, r + step * r1), there)
+        w1, r1 = motion_rates(car, front, rear, (w, r), here)
+        w2, r2 = motion_rates(car, front, rear, (w + step * w1, r + step * r1), there)
         w += 0.5 * step * (w1 + w2)
         r += 0.5 * step * (r1 + r2)
         motion[i + 1] = w, r
@@ -116,7 +127,7 @@ def march(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, step: float, fi
 
 
 @compiled
-def reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def motion_reports(car: Car, front: Axle, rear: Axle, inputs: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Channels (n, 7) of a motion: lateral acceleration (m/s^2), then loads (N), side forces (N) and slip angles (rad),
     front first.
     """

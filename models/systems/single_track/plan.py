@@ -3,13 +3,13 @@
 from models.core.assumptions import assumption_lines
 from models.measured.drive import read_drive
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.run import inputs
+from models.systems.single_track.run import equation_inputs
 from models.systems.single_track.scene import SingleTrackScene
 
 
 def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, a measured file that contains no drive."""
-    inputs(read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch)), scene)
+    equation_inputs(read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch)), scene)
 
 
 def describe(scene: SingleTrackScene) -> str:

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.core.tables import write_table
 from models.measured.outliers import without_outliers
 
-COLUMNS = {
+RACE_COLUMNS = {
     "time": ("t", "s"),
     "steer": ("delta", "rad"),
     "speed": ("vx", "m/s"),
@@ -20,7 +20,7 @@ COLUMNS = {
     "side slip": ("beta_true", "rad"),
 }
 """Name here -> column and unit of the race's file."""
-EVERY = 2
+KEPT_SAMPLE_INTERVAL = 2
 """Samples of the race's file of which one is kept, after a low-pass at a quarter of its rate."""
 RACE_CAR = {
     "vehicle": {"mass": 982.0, "front": 1.33, "rear": 1.07, "yaw_inertia": 1250.0},
@@ -31,7 +31,7 @@ RACE_CAR = {
 the bend, so that a car that is driven at the limit does not spin for a small error of its tyres."""
 
 
-PARAMETERS = (
+IDENTIFIED_PARAMETERS = (
     "vehicle.yaw_inertia=300:3000",
     "vehicle.front_brake=0:1",
     "front.stiffness=5:50",
@@ -51,34 +51,37 @@ PARAMETERS = (
 """What is identified of it."""
 
 
-def plain(source: Path, target: Path) -> Path:
-    """Write the race's file as a table that scenes can read: one of EVERY samples, low-passed so that frequencies which
-    these cannot resolve are removed.
+def write_plain_table(source: Path, target: Path) -> Path:
+    """Write the race's file as a table that scenes can read: one of KEPT_SAMPLE_INTERVAL samples, low-passed so that
+    frequencies which these cannot resolve are removed.
     """
-    raw = _raw(source)
+    raw = _raw_columns(source)
     period = float(np.median(np.diff(raw["t"])))
-    columns = {name: (unit, raw[column][::EVERY]) for name, (column, unit) in COLUMNS.items()}
-    for name, (column, unit) in list(COLUMNS.items())[1:]:
+    columns = {name: (unit, raw[column][::KEPT_SAMPLE_INTERVAL]) for name, (column, unit) in RACE_COLUMNS.items()}
+    for name, (column, unit) in list(RACE_COLUMNS.items())[1:]:
         kept = without_outliers(raw[column])
         known = np.isfinite(kept)
         whole = np.interp(raw["t"], raw["t"][known], kept[known])
-        columns[name] = (unit, smoothed(whole[:, None], period, 0.25 / period, str(source), column)[::EVERY, 0])
+        columns[name] = (
+            unit,
+            low_passed(whole[:, None], period, 0.25 / period, str(source), column)[::KEPT_SAMPLE_INTERVAL, 0],
+        )
     write_table(target, columns)
     return target
 
 
-def _raw(source: Path) -> dict[str, np.ndarray]:
+def _raw_columns(source: Path) -> dict[str, np.ndarray]:
     """Columns of the race's file, gzipped or not; InputError where one is missing, or times do not rise."""
     with gzip.open(source, "rt") if source.suffix == ".gz" else source.open() as file:
         head, *rows = list(csv.reader(file))
-    for column, _ in COLUMNS.values():
+    for column, _ in RACE_COLUMNS.values():
         if column not in head:
             raise InputError(source, column, None, "no such column in the race's file", tuple(head))
     try:
         table = np.array(rows, float)
     except ValueError as error:
         raise InputError(source, "rows", None, f"every row holds {len(head)} numbers: {error}") from None
-    raw = {column: table[:, head.index(column)] for column, _ in COLUMNS.values()}
+    raw = {column: table[:, head.index(column)] for column, _ in RACE_COLUMNS.values()}
     falls = np.flatnonzero(~(np.diff(raw["t"]) > 0.0))
     if len(falls):
         raise InputError(

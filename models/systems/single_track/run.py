@@ -8,19 +8,19 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import not_estimated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.measured.drive import MeasuredDrive, read_drive
 from models.systems.single_track.assumptions import assumptions
-from models.systems.single_track.equations import march, reports
+from models.systems.single_track.equations import march, motion_reports
 from models.systems.single_track.scene import SensorTable, SingleTrackScene
 
-SETTLING = 1.0
+SETTLING_DURATION = 1.0
 """s of the first input, held, before the drive begins: the car begins in the steady turn of its first sample."""
-LARGEST = 20.0
+LARGEST_YAW_RATE = 20.0
 """rad/s: a car that yaws faster has no tyres of this kind."""
-REPORTS = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
+REPORT_NAMES = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
 REPORT_COLUMNS = (1, 3, 5, 2, 4, 6)
-UNITS = ("N", "N", "rad") * 2
+REPORT_UNITS = ("N", "N", "rad") * 2
 
 
 def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Result:
@@ -31,12 +31,12 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
     """
     drive = read_drive(scene.path(scene.drive.file, "drive.file"), tuple(scene.drive.stretch))
     begun = time.process_time()
-    given = inputs(drive, scene)
+    given = equation_inputs(drive, scene)
     motion, table = motion_of(scene, given, float(drive.times[1] - drive.times[0]))
     channels = sensor_channels(scene.sensors, given, motion, table[:, 0])
     channels |= {
         name: Channel("time", table[:, column], unit)
-        for name, column, unit in zip(REPORTS, REPORT_COLUMNS, UNITS, strict=True)
+        for name, column, unit in zip(REPORT_NAMES, REPORT_COLUMNS, REPORT_UNITS, strict=True)
     }
     counts = {"steps": len(given) - 1} | {f"samples of {name} left out": n for name, n in drive.left_out.items()}
     run = result(
@@ -52,14 +52,14 @@ def run(scene: SingleTrackScene, engine: str = "", *, error: bool = False) -> Re
     return not_estimated(run, "steps are the samples of the measurement, whose own error is larger") if error else run
 
 
-def inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
+def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:
     """Inputs (n, 3) of the equations: steer angle of the wheels (rad), speed (m/s) and its rate (m/s^2), low-passed and
     corrected for the sensors' errors.
     """
     period, sensors = float(drive.times[1] - drive.times[0]), scene.sensors
     steer, speed = drive.steer, drive.speed
     if scene.drive.low_pass:
-        both = smoothed(np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass")
+        both = low_passed(np.column_stack([steer, speed]), period, scene.drive.low_pass, scene.file, "drive.low_pass")
         steer, speed = both.T
     if sensors.steer_delay:
         steer = np.interp(drive.times - sensors.steer_delay, drive.times, steer)
@@ -72,15 +72,15 @@ def motion_of(scene: SingleTrackScene, inputs: np.ndarray, period: float) -> tup
     sample.
     """
     parts = scene.car(), scene.front.axle(), scene.rear.axle()
-    settling = np.repeat(inputs[:1], max(2, round(SETTLING / period)), axis=0)
+    settling = np.repeat(inputs[:1], max(2, round(SETTLING_DURATION / period)), axis=0)
     first = march(*parts, settling, period, (0.0, 0.0))[-1]
     motion = march(*parts, inputs, period, (float(first[0]), float(first[1])))
-    bad = ~(np.abs(motion[:, 1]) < LARGEST)
+    bad = ~(np.abs(motion[:, 1]) < LARGEST_YAW_RATE)
     if bad.any():
         row = int(bad.argmax())
         why = "the car turns faster than any car: check units and signs of the drive, and the tyres"
         raise RunFailed("reference", why, period * row, motion[max(row - 1, 0)])
-    return motion, reports(*parts, inputs, motion)
+    return motion, motion_reports(*parts, inputs, motion)
 
 
 def sensor_channels(

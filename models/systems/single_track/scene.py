@@ -10,7 +10,7 @@ from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 from models.systems.single_track.equations import Axle, Car
 
-SHARPEST = 20.0
+LARGEST_SHARPNESS = 20.0
 
 
 class CarTable(Strict):
@@ -33,7 +33,9 @@ class AxleTable(Strict):
 
     stiffness: float = quantity("1/rad", "cornering stiffness by load")
     friction: float = quantity("", "largest side force by load")
-    sharpness: float = Field(default=2.0, ge=1.0, le=SHARPEST, description="of the bend from stiffness to friction")
+    sharpness: float = Field(
+        default=2.0, ge=1.0, le=LARGEST_SHARPNESS, description="of the bend from stiffness to friction"
+    )
     side: float = Field(default=0.0, ge=-0.5, le=0.5, description="share of friction more in left turns, less in right")
     lift: float = quantity("N s^2/m^2", "by which the air lifts the axle, or presses it", default=0.0, signed=True)
     rise: float = Field(default=0.0, ge=0.0, le=0.5, description="share of the stiffness that is left beyond the bend")

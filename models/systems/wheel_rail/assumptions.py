@@ -10,7 +10,7 @@ from models.core.result import Result
 from models.rail.contact_table import PatchReport
 from models.systems.wheel_rail.scene import WheelRailScene
 
-WHEELS = ("right", "left")
+WHEEL_NAMES = ("right", "left")
 
 
 def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
@@ -19,7 +19,7 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     """
     listed = [_half_space(), _within_profiles(scene)]
     if yields(scene.bodies.wheel, scene.bodies.rail):
-        listed.append(_elastic())
+        listed.append(_elastic_assumption())
     if friction > 0.0:
         listed += [_small_creepage(), _slow_slip(scene.wheelset.speed)]
     return listed
@@ -35,7 +35,7 @@ def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = T
         placed = run.detail.placed
         return {
             f"{wheel} wheel": np.array([worst(map(value, getattr(position, wheel))) for position in placed])
-            for wheel in WHEELS
+            for wheel in WHEEL_NAMES
         }
 
     return watched
@@ -51,7 +51,7 @@ def _half_space() -> Assumption:
         "lower wheelset.load, or compute with finite elements",
         _extreme_of_patches(share),
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
@@ -71,18 +71,18 @@ def _within_profiles(scene: WheelRailScene) -> Assumption:
         "use longer profiles or smaller positions",
         _extreme_of_patches(free, largest=False),
         "mm from the end",
-        least=0.0,
+        lower_limit=0.0,
     )
 
 
-def _elastic() -> Assumption:
+def _elastic_assumption() -> Assumption:
     return Assumption(
         "elastic",
         "the steel does not flow",
         "lower wheelset.load: a real contact would be larger and its pressure lower",
         _extreme_of_patches(lambda place: 1e-6 * place.peak),
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -96,7 +96,7 @@ def _small_creepage() -> Assumption:
         "lower the yaw: a wheel that slides is no rolling contact",
         _extreme_of_patches(largest),
         "",
-        most=SMALL_CREEPAGE,
+        upper_limit=SMALL_CREEPAGE,
     )
 
 
@@ -107,5 +107,5 @@ def _slow_slip(speed: float) -> Assumption:
         "give the case's friction as it is for such slip, or lower wheelset.speed",
         _extreme_of_patches(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
         "m/s",
-        most=FAST_SLIP,
+        upper_limit=FAST_SLIP,
     )

@@ -10,28 +10,28 @@ import numpy as np
 
 from models.contact.wheel_on_rail import SURROUNDINGS_DISTANCE
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_cells, not_estimated, stated
+from models.core.discretisation import by_cells, not_estimated, with_stated_errors
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.rail.contact_table import PatchReport, WheelsetContact, WheelsetPlacement, rolling_radius_difference
-from models.systems.wheel_rail.assumptions import WHEELS, assumptions
+from models.systems.wheel_rail.assumptions import WHEEL_NAMES, assumptions
 from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
 
 TOO_DEEP = ("distance", "load")
 """What the theories complain of where the contact grows out of its surroundings."""
-POSITION = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
+POSITION_UNITS = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
 """Quantities of a position, with their units."""
-DEGREES = -180.0 / np.pi
-SUMS = {"normal": "N", "area": "m^2", "fx": "N", "fy": "N", "peak": "Pa"}
+OUTWARD_DEGREES_PER_RADIAN = -180.0 / np.pi
+WHEEL_QUANTITIES = {"normal": "N", "area": "m^2", "fx": "N", "fy": "N", "peak": "Pa"}
 """Quantities of a wheel whose error is told, with their units."""
-EVERY = 2
+POSITIONS_PER_ERROR = 2
 """Of so many positions one tells the error."""
-PATCH: dict[str, tuple[str, float, str]] = {
+PATCH_QUANTITIES: dict[str, tuple[str, float, str]] = {
     "on_rail": ("mm", 1e3, "on_rail"),
     "in_track": ("mm", 1e3, "y"),
     "on_wheel": ("mm", 1e3, "wheel_centre"),
     "ahead": ("mm", 1e3, "x"),
-    "angle": ("deg", DEGREES, "centre_angle"),
+    "angle": ("deg", OUTWARD_DEGREES_PER_RADIAN, "centre_angle"),
     "normal": ("kN", 1e-3, "normal"),
     "peak": ("MPa", 1e-6, "peak"),
     "area": ("mm^2", 1e6, "area"),
@@ -40,7 +40,7 @@ PATCH: dict[str, tuple[str, float, str]] = {
     "rolling_radius": ("mm", 1e3, "rolling_radius"),
     "touch_on_rail": ("mm", 1e3, "touch_on_rail"),
     "touch_on_wheel": ("mm", 1e3, "wheel_y"),
-    "touch_angle": ("deg", DEGREES, "angle"),
+    "touch_angle": ("deg", OUTWARD_DEGREES_PER_RADIAN, "angle"),
     "fx": ("kN", 1e-3, "fx"),
     "fy": ("kN", 1e-3, "fy"),
     "mz": ("N m", 1.0, "mz"),
@@ -55,13 +55,13 @@ PATCH: dict[str, tuple[str, float, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
-    """Contacts of a case. placed : the contact at each position that has one; failed : reasons for the others, by
+class ContactsOfCase:
+    """Contacts of a case. placed : the contact at each position that has one; failures : reasons for the others, by
     position (mm); seconds : processor time of each.
     """
 
     placed: list[WheelsetPlacement] = field(default_factory=list)
-    failed: dict[float, str] = field(default_factory=dict)
+    failures: dict[float, str] = field(default_factory=dict)
     seconds: list[float] = field(default_factory=list)
 
 
@@ -73,7 +73,7 @@ def run(
     *,
     error: bool = False,
 ) -> Result:
-    """Compute a case, by default the first, at every position of the wheelset; the detail is its ``Contacts``.
+    """Compute a case, by default the first, at every position of the wheelset; the detail is its ``ContactsOfCase``.
 
     Channels of positions lie over the shift, those of patches over shift, wheel and patch, the patch with the largest
     load first; not a number where there is no further patch. Positions that fail are doubts. progress : called before
@@ -81,7 +81,7 @@ def run(
     cells, too, from which the error of the cells is estimated. Raises InputError for files that are no profiles.
     """
     name = case or next(iter(scene.cases))
-    held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
+    held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, ContactsOfCase()
     for i, shift in enumerate(scene.positions.values().tolist()):
         progress(1e3 * shift, i / scene.positions.count)
         begun = time.process_time()
@@ -89,14 +89,14 @@ def run(
             contacts.placed.append(held.at(shift, yaw * shift))
         except (InputError, RunFailed) as failure:
             deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
-            contacts.failed[1e3 * shift] = (
+            contacts.failures[1e3 * shift] = (
                 f"a load of {held.load:g} N presses wheel and rail more than {1e3 * SURROUNDINGS_DISTANCE:g} mm into "
                 "each other"
                 if deep
                 else str(failure)
             )
         contacts.seconds.append(time.process_time() - begun)
-    labelled = with_assumptions(_labelled(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
+    labelled = with_assumptions(_labelled_result(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
     return _with_error(labelled, scene, held) if error and contacts.placed else labelled
 
 
@@ -108,24 +108,24 @@ def _with_error(run: Result, scene: WheelRailScene, contact: WheelsetContact) ->
     refer to the root mean square.
     """
     fine, coarse = list[WheelsetPlacement](), list[WheelsetPlacement]()
-    for placed in run.detail.placed[::EVERY]:
+    for placed in run.detail.placed[::POSITIONS_PER_ERROR]:
         with suppress(InputError, RunFailed):
-            coarse.append(replace(contact, coarser=2.0 * contact.coarser).at(placed.shift, placed.yaw))
+            coarse.append(replace(contact, cell_factor=2.0 * contact.cell_factor).at(placed.shift, placed.yaw))
             fine.append(placed)
     if not coarse:
         return not_estimated(run, "no position is found on half the cells")
-    of_fine, of_coarse = (np.array([sums(placed) for placed in each]) for each in (fine, coarse))
+    of_fine, of_coarse = (np.array([wheel_sums(placed) for placed in each]) for each in (fine, coarse))
     errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
     told = {
         name: by_cells(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
-        for (name, unit), error, size in zip(SUMS.items(), errors, sizes, strict=True)
+        for (name, unit), error, size in zip(WHEEL_QUANTITIES.items(), errors, sizes, strict=True)
     }
-    return stated(run, told, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
+    return with_stated_errors(run, told, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
 
 
-def sums(placed: WheelsetPlacement) -> np.ndarray:
-    """Quantities ``SUMS`` (2, 5) of the right and of the left wheel: sums over the wheel's patches, then the largest
-    pressure.
+def wheel_sums(placed: WheelsetPlacement) -> np.ndarray:
+    """Quantities ``WHEEL_QUANTITIES`` (2, 5) of the right and of the left wheel: sums over the wheel's patches, then
+    the largest pressure.
     """
     return np.array(
         [
@@ -136,29 +136,31 @@ def sums(placed: WheelsetPlacement) -> np.ndarray:
     )
 
 
-def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
+def _labelled_result(scene: WheelRailScene, case: str, contacts: ContactsOfCase) -> Result:
     positions = [position_quantities(placed) for placed in contacts.placed]
-    most = max((len(position[wheel]) for position in positions for wheel in WHEELS), default=0)
-    missing = dict.fromkeys(PATCH, np.nan)
-    rows = [(*position[wheel], *[missing] * most)[:most] for position in positions for wheel in WHEELS]
+    most = max((len(position[wheel]) for position in positions for wheel in WHEEL_NAMES), default=0)
+    missing = dict.fromkeys(PATCH_QUANTITIES, np.nan)
+    rows = [(*position[wheel], *[missing] * most)[:most] for position in positions for wheel in WHEEL_NAMES]
     channels = {
         key: Channel("shift", np.array([position[key] for position in positions], float), unit)
-        for key, unit in POSITION.items()
+        for key, unit in POSITION_UNITS.items()
     }
-    axes = {"shift": channels.pop("shift"), "wheel": Channel("wheel", list(WHEELS))}
+    axes = {"shift": channels.pop("shift"), "wheel": Channel("wheel", list(WHEEL_NAMES))}
     channels |= {
         key: Channel(
             ("shift", "wheel", "patch"),
-            np.array([[patch[key] for patch in row] for row in rows], float).reshape(len(positions), len(WHEELS), most),
+            np.array([[patch[key] for patch in row] for row in rows], float).reshape(
+                len(positions), len(WHEEL_NAMES), most
+            ),
             unit,
         )
-        for key, (unit, _, _) in PATCH.items()
+        for key, (unit, _, _) in PATCH_QUANTITIES.items()
     }
-    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failed.items()]
+    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failures.items()]
     return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
 
 
-def patches(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
+def patches_by_force(placed: WheelsetPlacement, wheel: str) -> tuple[PatchReport, ...]:
     """The patches of one wheel, in the order of their normal force, largest first."""
     return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
 
@@ -173,9 +175,9 @@ def position_quantities(placed: WheelsetPlacement) -> dict[str, Any]:
         "radius_difference": 1e3 * rolling_radius_difference(placed),
         **{
             wheel: [
-                {key: factor * getattr(place, name) for key, (_, factor, name) in PATCH.items()}
-                for place in patches(placed, wheel)
+                {key: factor * getattr(place, name) for key, (_, factor, name) in PATCH_QUANTITIES.items()}
+                for place in patches_by_force(placed, wheel)
             ]
-            for wheel in WHEELS
+            for wheel in WHEEL_NAMES
         },
     }

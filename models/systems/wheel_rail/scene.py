@@ -11,7 +11,7 @@ from models.contact.material import MaterialPair
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
-from models.rail.contact_table import CELLS, WheelsetContact
+from models.rail.contact_table import CELLS_PER_STRIP, WheelsetContact
 from models.rail.laid_profiles import Profiles
 from models.systems.contact.scene import Bodies
 
@@ -52,7 +52,7 @@ class Method(Strict):
     """[method]: how finely contacts are computed."""
 
     cells: int = Field(
-        default=CELLS, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
+        default=CELLS_PER_STRIP, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
     )
 
 
@@ -77,11 +77,11 @@ class WheelRailScene(SceneFile):
             self.wheelset.speed,
             case.friction,
             MaterialPair(self.bodies.wheel, self.bodies.rail),
-            CELLS / self.method.cells,
+            CELLS_PER_STRIP / self.method.cells,
         )
 
 
-BOUNDS = {
+PLAUSIBLE_RANGES = {
     "profiles.inclination": (-0.5, 0.5, "rad"),
     "profiles.gauge": (0.1, 3.0, "m"),
     "profiles.back_to_back": (0.1, 3.0, "m"),
@@ -101,7 +101,7 @@ LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(WheelRailScene, table, file, folder)
-    for place, (least, most, unit) in BOUNDS.items():
+    for place, (least, most, unit) in PLAUSIBLE_RANGES.items():
         owner, key = place.split(".")
         value = getattr(getattr(scene, owner), key)
         if not least <= value <= most:

@@ -10,7 +10,7 @@ from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail import wheel_forces as wf
 from models.rail.equations import ROLL, YAW, Equations, WheelsetPath, Y
-from models.rail.flange_climbing import bound_shares, nadal
+from models.rail.flange_climbing import bound_shares, nadal_limit
 from models.rail.wheelset import Wheelset
 
 LEAST_LOAD = 0.05
@@ -21,22 +21,28 @@ LARGEST_TRAVEL = 0.02
 """m of the axle's ends in their suspension, whose springs are lines: guides and stops leave no more."""
 LARGEST_YAW = 0.05
 """rad: the curvatures of a contact are those without yaw."""
-TIP = 2e-3
+CLIMBING_DISTANCE = 2e-3
 """m from the flange's tip at which a wheel has climbed, as in the table of contacts."""
-FRICTION = 0.02
+LEAST_FRICTION = 0.02
 """Coefficient below which nothing creeps as a wheel on a rail does."""
 
 
 def assumptions(equations: Equations) -> list[Assumption]:
     """Assumptions of a path of the wheelset at its speed. They are judged by the path, the detail of a result."""
     wheelset = equations.wheelset
-    listed = [_wheels_press(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
-    listed += [_elastic()] if yields(wheelset.material) else []
-    listed += [_no_slip(wheelset)] if equations.law == "linear" else []
-    listed += [_travel(wheelset)] if equations.body.held else []
+    listed = [
+        _wheels_press(wheelset),
+        _small_yaw(),
+        _rolling_assumption(equations),
+        _half_space(),
+        _slow_slip(equations),
+    ]
+    listed += [_elastic_assumption()] if yields(wheelset.material) else []
+    listed += [_no_slip_assumption(wheelset)] if equations.law == "linear" else []
+    listed += [_travel_assumption(wheelset)] if equations.body.held else []
     if wheelset.profiles is not None:
         return [*listed, _within_profiles(wheelset)]
-    return [*listed, _climbs(wheelset), _flange_way(wheelset)]
+    return [*listed, _climbing_assumption(wheelset), _flange_way(wheelset)]
 
 
 def of_linear(wheelset: Wheelset) -> list[Assumption]:
@@ -48,7 +54,7 @@ def of_linear(wheelset: Wheelset) -> list[Assumption]:
             "raise wheelset.override.friction",
             lambda run: {"rails": np.array([wheelset.friction])},
             "",
-            least=FRICTION,
+            lower_limit=LEAST_FRICTION,
         )
     ]
 
@@ -64,7 +70,7 @@ def sums_by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
     return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
 
 
-def _of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
+def _watch_of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
     """Return the watch function for a result whose detail is a path, or a periodic motion that has one."""
 
     def of_result(run: Result) -> Watched:
@@ -73,7 +79,7 @@ def _of_path(watched: Callable[[WheelsetPath], Watched]) -> Callable[[Result], W
     return of_result
 
 
-def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
+def _watch_of_patches(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     """Return the watch function of a value's maximum among the loaded patches of each wheel, 0 where none is loaded."""
 
     def of_path(path: WheelsetPath) -> Watched:
@@ -81,7 +87,7 @@ def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
         values = np.where(load > 0.0, np.abs(watched(path.contacts)), 0.0)
         return {"right wheel": values[:, :each].max(axis=1), "left wheel": values[:, each:].max(axis=1)}
 
-    return _of_path(of_path)
+    return _watch_of_path(of_path)
 
 
 def _wheels_press(wheelset: Wheelset) -> Assumption:
@@ -89,9 +95,11 @@ def _wheels_press(wheelset: Wheelset) -> Assumption:
         "wheels press",
         "both wheels stay on their rails",
         "start with a smaller displacement, or travel below the critical speed",
-        _of_path(lambda path: sums_by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))),
+        _watch_of_path(
+            lambda path: sums_by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))
+        ),
         "N",
-        least=LEAST_LOAD * wheelset.load / 2.0,
+        lower_limit=LEAST_LOAD * wheelset.load / 2.0,
     )
 
 
@@ -100,21 +108,21 @@ def _small_yaw() -> Assumption:
         "small yaw",
         "the yaw is so small that a contact's curvatures are those without it",
         "start with a smaller displacement or yaw, or stiffen stiffness_x",
-        _of_path(lambda path: {"axle": path.states[:, YAW]}),
+        _watch_of_path(lambda path: {"axle": path.states[:, YAW]}),
         "rad",
         -LARGEST_YAW,
         LARGEST_YAW,
     )
 
 
-def _rolls(equations: Equations) -> Assumption:
+def _rolling_assumption(equations: Equations) -> Assumption:
     return Assumption(
         "speed",
         "the wheelset rolls so fast that creepage is by its speed",
         f"travel at {wf.REGULAR:g} m/s or more",
         lambda run: {"wheelset": np.array([abs(equations.speed)])},
         "m/s",
-        least=wf.REGULAR,
+        lower_limit=wf.REGULAR,
     )
 
 
@@ -131,13 +139,13 @@ def _half_space() -> Assumption:
         "half-space",
         "contacts are small beside the radii of wheel and rail",
         "lower the load, or use profiles whose radii are larger",
-        _touching(watched),
+        _watch_of_patches(watched),
         "of the radius",
-        most=HALF_SPACE,
+        upper_limit=HALF_SPACE,
     )
 
 
-def _elastic() -> Assumption:
+def _elastic_assumption() -> Assumption:
     def watched(contacts: Array) -> Array:
         area = np.pi * contacts["a"] * contacts["b"]
         return 1.5e-6 * contacts["load"] / np.where(area > 0.0, area, np.inf)
@@ -146,9 +154,9 @@ def _elastic() -> Assumption:
         "elastic",
         "the steel does not flow",
         "lower the load or the displacement: real contacts would be larger, and their pressure lower",
-        _touching(watched),
+        _watch_of_patches(watched),
         "MPa",
-        most=1e-6 * YIELDS,
+        upper_limit=1e-6 * YIELDS,
     )
 
 
@@ -158,13 +166,13 @@ def _slow_slip(equations: Equations) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give wheelset.override.friction as it is for such slip, or travel slower",
-        _touching(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
+        _watch_of_patches(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
         "m/s",
-        most=FAST_SLIP,
+        upper_limit=FAST_SLIP,
     )
 
 
-def _no_slip(wheelset: Wheelset) -> Assumption:
+def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
         contacts = path.contacts
         creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
@@ -175,13 +183,13 @@ def _no_slip(wheelset: Wheelset) -> Assumption:
         "no slip",
         "the creep forces of the linear law are far below mu N",
         'name the effect fastsim: contact.law = "fastsim"',
-        _of_path(watched),
+        _watch_of_path(watched),
         "mu N",
-        most=NO_SLIP,
+        upper_limit=NO_SLIP,
     )
 
 
-def _travel(wheelset: Wheelset) -> Assumption:
+def _travel_assumption(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
         along, up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
         return {"along": np.abs(along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(up)}
@@ -190,13 +198,13 @@ def _travel(wheelset: Wheelset) -> Assumption:
         "suspension",
         "springs and dampers of the suspension are lines",
         "stiffen the suspension: real guides have stops",
-        _of_path(watched),
+        _watch_of_path(watched),
         "mm",
-        most=1e3 * LARGEST_TRAVEL,
+        upper_limit=1e3 * LARGEST_TRAVEL,
     )
 
 
-def _climbs(wheelset: Wheelset) -> Assumption:
+def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     def watched(path: WheelsetPath) -> Watched:
         part = bound_shares(path.contacts["flange_force"], path.contacts["load"])
         return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
@@ -205,9 +213,9 @@ def _climbs(wheelset: Wheelset) -> Assumption:
         "no flange climbs",
         "no flange is pushed so hard that it climbs (Nadal, 70 degrees)",
         "name the effect profiles, which show it",
-        _of_path(watched),
+        _watch_of_path(watched),
         "of the wheel's load",
-        most=max(0.0, nadal(wheelset.friction)),
+        upper_limit=max(0.0, nadal_limit(wheelset.friction)),
     )
 
 
@@ -216,9 +224,9 @@ def _flange_way(wheelset: Wheelset, watched: Callable[[Result], Watched] | None 
         "on the tread",
         "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
         "name the effect profiles, which have flanges of their own",
-        watched or _of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
+        watched or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
-        most=wheelset.flange_clearance + FLANGE_WAY,
+        upper_limit=wheelset.flange_clearance + FLANGE_WAY,
     )
 
 
@@ -235,7 +243,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
         load, half = contacts["load"], contacts["b"]
         wheel, rail = np.abs(_along_axle(path)) - side.wheelset.arm, np.abs(_across_track(path))
         ends = {
-            "flange's tip": wheel - tip - TIP,
+            "flange's tip": wheel - tip - CLIMBING_DISTANCE,
             "wheel's face": outer - wheel - half,
             "rail's ends": np.minimum(rail - side.rail.y[0], side.rail.y[-1] - rail) - half,
         }
@@ -245,9 +253,9 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
         "within the profiles",
         "contacts lie within the profiles, below the flange's tip",
         "start with a smaller displacement, or use longer profiles",
-        _of_path(watched),
+        _watch_of_path(watched),
         "mm",
-        least=0.0,
+        lower_limit=0.0,
     )
 
 

@@ -18,7 +18,7 @@ from models.rail.wheelset import Wheelset
 from models.systems.wheelset.of_scene import wheelset_of
 from models.systems.wheelset.scene import ConicityTable, WheelsetScene
 
-CHANNELS = {
+CONICITY_CHANNELS = {
     "centre": ("m", "of the wave, to the right"),
     "equivalent": ("-", "equivalent conicity by EN 15302"),
     "harmonic": ("-", "conicity of the harmonic linearisation"),
@@ -31,13 +31,13 @@ CHANNELS = {
 @dataclass(frozen=True, eq=False)
 class Conicities:
     """Equivalent conicities. table : rolling radius differences (m); rows : one per amplitude, not a number where there
-    is no wave; why : reasons for that, by amplitude (m); source : text on what the table describes; wavelengths : of
-    the rows (m).
+    is no wave; missing_reasons : reasons for that, by amplitude (m); source : text on what the table describes;
+    wavelengths : of the rows (m).
     """
 
     table: RollingRadiusTable
     rows: tuple[ConicityRow, ...]
-    why: dict[float, str]
+    missing_reasons: dict[float, str]
     source: str
     wavelengths: tuple[float, ...]
 
@@ -71,7 +71,7 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
     values = [asdict(row) | {"wavelength": row.period * track} for row in rows]
     channels = {
         name: Channel("amplitude", np.array([row[name] for row in values]), unit, meaning)
-        for name, (unit, meaning) in CHANNELS.items()
+        for name, (unit, meaning) in CONICITY_CHANNELS.items()
     }
     axis = Channel("amplitude", np.array(asked.amplitudes), "m")
     doubts = [f"at {amplitude:g} m: {reason}" for amplitude, reason in why.items()]
@@ -123,8 +123,8 @@ def _table(
 
 def refuse_without_wave(scene: WheelsetScene, conicities: Conicities) -> None:
     """Raise InputError where the wheelset has no wave at any of the scene's amplitudes."""
-    if len(conicities.why) == len(conicities.rows):
-        amplitude, why = next(iter(conicities.why.items()))
+    if len(conicities.missing_reasons) == len(conicities.rows):
+        amplitude, why = next(iter(conicities.missing_reasons.items()))
         table = scene.conicity.table if scene.conicity else None
         raise InputError(table or scene.file, "conicity.amplitudes", amplitude, why)
 
@@ -142,13 +142,13 @@ def conicity_numbers(run_of_scene: Result) -> dict[str, Any]:
     }
 
 
-def lines(conicities: Conicities) -> list[str]:
+def conicity_lines(conicities: Conicities) -> list[str]:
     """Text with both conicities at every amplitude."""
     head = f"    {'amplitude':>12}{'EN 15302':>12}{'+-':>10}{'1st harmonic':>14}{'centre':>13}{'wavelength':>14}"
     told = [f"  equivalent conicity of {conicities.source}", head]
     for row, wavelength in zip(conicities.rows, conicities.wavelengths, strict=True):
-        if row.amplitude in conicities.why:
-            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.why[row.amplitude]}")
+        if row.amplitude in conicities.missing_reasons:
+            told.append(f"    {1e3 * row.amplitude:>9.4g} mm  {conicities.missing_reasons[row.amplitude]}")
             continue
         error = f"{row.spacing_error:>10.1g}" if math.isfinite(row.spacing_error) else f"{'-':>10}"
         wave = f"{wavelength:>12.5g} m" if math.isfinite(wavelength) else f"{'no wave':>14}"

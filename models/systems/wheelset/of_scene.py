@@ -8,45 +8,45 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended
+from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import existing, parse
 from models.rail.equations import YAW, Equations
 from models.rail.linear import critical_or_why
-from models.rail.wheelset import CHOSEN, Wheelset
+from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
 
-SETS = {"chosen": CHOSEN}
-IMPLEMENTATIONS = {
+PARAMETER_SETS = {"chosen": CHOSEN_WHEELSET}
+IMPLEMENTATION_MODULES = {
     "reference": "models.rail.equations.Equations",
     "exudyn": "models.engines.wheelset.ExudynWheelset",
     "mujoco": "models.engines.wheelset.MujocoWheelset",
 }
-FLANGE = "flange_stiffness"
+FLANGE_KEY = "flange_stiffness"
 """The only parameter that profiles leave nothing to do: cones stand for them where motions are small."""
-BESIDE = (0.9, 1.1)
+SPEED_SHARES = (0.9, 1.1)
 """Speeds of the paths by the critical one, where the scene names none."""
 
 
 def wheelset_of(scene: WheelsetScene) -> Wheelset:
     """The wheelset with the scene's overrides; an error names the file from which the value comes."""
     name, override = scene.wheelset.parameters, scene.wheelset.override
-    base = SETS.get(name)
+    base = PARAMETER_SETS.get(name)
     if base is None and not name.endswith(".toml"):
         allowed = "must be a TOML file with all parameters, or a parameter set"
-        raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(SETS))
+        raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(PARAMETER_SETS))
     if base is None:
         path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _checked_wheelset(parse(path), path.name, "")
     profiles = base.profiles if scene.profiles is None else scene.profiles.located(scene)
-    if profiles is not None and FLANGE in override:
+    if profiles is not None and FLANGE_KEY in override:
         raise InputError(
             scene.file,
-            f"wheelset.override.{FLANGE}",
-            override[FLANGE],
+            f"wheelset.override.{FLANGE_KEY}",
+            override[FLANGE_KEY],
             "has no meaning beside profiles, which have flanges of their own: drop one of them",
         )
     values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
-    return extended(_checked_wheelset(values | override, scene.file, "wheelset.override"), scene)
+    return extended_by_effects(_checked_wheelset(values | override, scene.file, "wheelset.override"), scene)
 
 
 def _checked_wheelset(values: dict[str, Any], file: str, table: str) -> Wheelset:
@@ -62,7 +62,7 @@ def implementation(engine: str) -> type[Equations]:
     """The class of the equations of motion for an implementation; only its own engine is imported, when it is
     needed.
     """
-    module, _, name = IMPLEMENTATIONS[engine].rpartition(".")
+    module, _, name = IMPLEMENTATION_MODULES[engine].rpartition(".")
     return getattr(import_module(module), name)
 
 
@@ -76,7 +76,7 @@ def _initial_state(
     engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
     equations = implementation(engine)(wheelset, speed, law, cells)
-    state = equations.displaced(shift)
+    state = equations.displaced_state(shift)
     state[YAW] = yaw
     return equations, state
 
@@ -96,4 +96,4 @@ def path_speeds(scene: WheelsetScene) -> list[float]:
     if scene.run.speeds:
         return list(scene.run.speeds)
     critical, _ = critical_or_why(wheelset_of(scene))
-    return [round(share * critical, 2) for share in BESIDE] if critical else [float(scene.speeds.all()[-1])]
+    return [round(share * critical, 2) for share in SPEED_SHARES] if critical else [float(scene.speeds.all()[-1])]

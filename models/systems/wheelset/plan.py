@@ -2,15 +2,15 @@
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
-from models.core.scene_effects import lines as effect_lines
-from models.rail.linear import critical_or_why, klingel
+from models.core.scene_effects import effect_lines as effect_lines
+from models.rail.linear import critical_or_why, klingel_wavelength
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.assumptions import assumptions, of_linear
 from models.systems.wheelset.conicity import check as check_conicity
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
 from models.systems.wheelset.scene import ConicityTable, WheelsetScene
 
-LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
+LAW_TEXTS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
@@ -37,13 +37,13 @@ def describe(scene: WheelsetScene) -> str:
         "wheelset": scene.wheelset.parameters + (f", but {changed}" if changed else ""),
         "": f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, spin",
         "wheels": _wheels(wheelset),
-        "contact": f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
+        "contact": f"{LAW_TEXTS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
         f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}",
         "flange": "that of the profile"
         if wheelset.profiles
         else f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m",
-        "held by": _suspension(wheelset),
-        "Klingel": f"wavelength {klingel(wheelset):.5g} m",
+        "held by": _suspension_text(wheelset),
+        "Klingel": f"wavelength {klingel_wavelength(wheelset):.5g} m",
         "critical": f"{critical:.5g} m/s by the linear theory of two motions"
         if critical
         else f"none: the wheelset {why}",
@@ -54,10 +54,10 @@ def describe(scene: WheelsetScene) -> str:
     if scene.conicity is not None:
         lines["conicity"] = _conicity(scene.conicity)
     told = [f"  {head:<10} {text}" for head, text in lines.items()]
-    return "\n".join([scene.title, *told, *effect_lines(scene), *_assumed(scene), "", *ENGINES])
+    return "\n".join([scene.title, *told, *effect_lines(scene), *_assumption_lines(scene), "", *ENGINES])
 
 
-def _assumed(scene: WheelsetScene) -> list[str]:
+def _assumption_lines(scene: WheelsetScene) -> list[str]:
     """Lines on the assumptions of paths and of eigenvalues."""
     equations = equations_of(scene, "reference", path_speeds(scene)[0])
     return assumption_lines([*assumptions(equations), *of_linear(equations.wheelset)])
@@ -78,7 +78,7 @@ def _conicity(conicity_table: ConicityTable) -> str:
     return f"{of}, at amplitudes of {amplitudes} mm, by EN 15302 and by the first harmonic"
 
 
-def _suspension(wheelset: Wheelset) -> str:
+def _suspension_text(wheelset: Wheelset) -> str:
     """Text on the springs and dampers of one side along each axis."""
     w = wheelset
     sizes = ((axis, getattr(w, f"stiffness_{axis}"), getattr(w, f"damping_{axis}")) for axis in "xyz")

@@ -11,19 +11,27 @@ import numpy as np
 
 from models.contact.accuracy import coarser_cells
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, stated
+from models.core.discretisation import Estimate, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, join_results, result
-from models.core.told import gathered
+from models.core.told import joined_result
 from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, places_of
-from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
+from models.rail.eigenvalues import hunting_eigenvalue, largest_growth, root_locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
-from models.rail.limit_cycle import Orbit, Unknown, attained, bifurcation, guess_from_orbit, refined, solved_orbit
+from models.rail.limit_cycle import (
+    Orbit,
+    SoughtQuantity,
+    attained_cycle,
+    bifurcation,
+    guess_from_orbit,
+    refined_orbit,
+    solved_orbit,
+)
 from models.rail.linear import NoCriticalSpeed, critical_or_why
 from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
 from models.systems.wheelset.of_scene import (
-    BESIDE,
+    SPEED_SHARES,
     equations_and_start,
     equations_of,
     implementation,
@@ -31,17 +39,17 @@ from models.systems.wheelset.of_scene import (
     wheelset_of,
 )
 from models.systems.wheelset.scene import WheelsetScene
-from models.systems.wheelset.stated_error import FEWEST, with_error, with_error_of_cycles
+from models.systems.wheelset.stated_error import FEWEST_CELLS, with_error, with_error_of_cycles
 
 STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
 CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz": ("mz", "N m"), "power": ("power", "W")}
 """What is saved of every path, with its place or field and its unit."""
-SPEED: Unknown = "speed"
-AMPLITUDE: Unknown = "amplitude"
+SPEED: SoughtQuantity = "speed"
+AMPLITUDE: SoughtQuantity = "amplitude"
 """What is sought of a cycle: along a branch, and at a speed."""
-MARCHES = 11
+PAIRS_OF_MARCHES = 11
 """Pairs of marches that linearise a return: what workers can share."""
-ORBIT = {
+ORBIT_CHANNELS = {
     "speed": "m/s",
     "amplitude": "m",
     "frequency": "Hz",
@@ -69,7 +77,7 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
 def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: WheelsetPath, **more: Any) -> Result:
     """A motion as the result of a scene at a speed (m/s), with the assumptions that it breaks."""
     equations, _ = equations_and_start(scene, engine, speed)
-    return with_assumptions(_labelled(scene, engine, motion, **more), assumptions(equations))
+    return with_assumptions(_labelled_result(scene, engine, motion, **more), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
@@ -78,7 +86,7 @@ def path(scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
     return equations.run(start, scene.run.duration, scene.run.step)
 
 
-def _labelled(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: Any) -> Result:
+def _labelled_result(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: Any) -> Result:
     steps, times = len(motion.times) - 1, Channel("time", motion.times, "s")
     channels = {name: Channel("time", motion.states[:, k], unit) for name, (k, unit) in STATES.items()}
     channels |= {
@@ -90,8 +98,8 @@ def _labelled(scene: WheelsetScene, engine: str, motion: WheelsetPath, **more: A
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Results by engine and speed (m/s), joined to one result over engine, speed and time."""
-    each = {engine: gathered(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
-    whole = gathered(join_results(each, "engine"), each)
+    each = {engine: joined_result(join_results(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
+    whole = joined_result(join_results(each, "engine"), each)
     whole.data["speed"].attrs["units"] = "m/s"
     return whole
 
@@ -104,22 +112,22 @@ def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
 @dataclass(frozen=True, eq=False)
 class Linear:
     """Linearised motion. values (speeds, 9) : eigenvalues in 1/s at speeds (m/s); wavelength (m) : of the free
-    wheelset; critical : critical speed (m/s), None if there is none; why : the reason.
+    wheelset; critical_speed : critical speed (m/s), None if there is none; no_critical_reason : the reason.
     """
 
     speeds: np.ndarray
     values: np.ndarray
     wavelength: float
-    critical: float | None
-    why: str
+    critical_speed: float | None
+    no_critical_reason: str
 
     @property
     def hunting(self) -> np.ndarray:
         """Eigenvalue (speeds,) of the least damped oscillation in 1/s."""
-        return hunting(self.values)
+        return hunting_eigenvalue(self.values)
 
 
-def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
+def linearised_result(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
     """Eigenvalues over the scene's speeds with linear creep; the result's detail is ``Linear``.
 
     error : whether the error of the finite differences of the linearisation is estimated, at the last speed.
@@ -127,9 +135,9 @@ def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Res
     kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
     linear = Linear(
         speeds,
-        locus(kind, wheelset, speeds),
+        root_locus(kind, wheelset, speeds),
         wavelength(kind, wheelset),
-        *critical_or_why(wheelset, partial(growth, kind)),
+        *critical_or_why(wheelset, partial(largest_growth, kind)),
     )
     channels = {
         name: Channel(("speed", "eigenvalue"), part, "1/s")
@@ -140,13 +148,15 @@ def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Res
     left = uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
     if math.isfinite(left):
         told = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
-        stated(
+        with_stated_errors(
             labelled, {"hunting eigenvalue": told}, "differences over twice the way at the last speed", "times the way"
         )
     return labelled
 
 
-def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False) -> Result:
+def branch_result(
+    scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: None, *, error: bool = False
+) -> Result:
     """Limit cycles in the order of rising amplitude, within the scene's speeds, by the written equations; the detail is
     their orbits.
 
@@ -156,20 +166,20 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    with Crew.of(scene, usual=1).at_work(MARCHES, *places_of(scene)) as pool:
+    with Crew.of(scene, usual=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)
                 progress(len(orbits))
         except NoCriticalSpeed as none:
             why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
-            reached = block_results(partial(_reached, scene), speeds.tolist() if none.unstable else [], pool)
+            reached = block_results(partial(_reached_cycle, scene), speeds.tolist() if none.unstable else [], pool)
             orbits = [orbit for orbit in reached if orbit is not None]
         except RunFailed as failure:
             why = [f"the branch is followed no further: {failure.reason}"]
     channels = {
         name: Channel("cycle", np.array([getattr(orbit, name) for orbit in orbits]), unit)
-        for name, unit in ORBIT.items()
+        for name, unit in ORBIT_CHANNELS.items()
     }
     labelled = result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
     with_assumptions(labelled, of_branch(equations.wheelset))
@@ -180,9 +190,9 @@ def branch(scene: WheelsetScene, progress: Callable[[int], Any] = lambda count: 
     return labelled
 
 
-def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> Orbit | None:
+def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: SoughtQuantity) -> Orbit | None:
     """The limit cycle solved on half the cells, in twice the step; None where there is none."""
-    if scene.contact.cells < FEWEST:
+    if scene.contact.cells < FEWEST_CELLS:
         return None
     coarse = replace(orbit, steps=orbit.steps // 2)
     try:
@@ -195,23 +205,23 @@ def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> 
         return None
 
 
-def _reached(scene: WheelsetScene, speed: float) -> Orbit | None:
+def _reached_cycle(scene: WheelsetScene, speed: float) -> Orbit | None:
     """The refined limit cycle that a motion reaches at a speed (m/s); None where the motion dies out."""
-    orbit = _attained(scene, speed)
-    return None if orbit is None else refined(orbit, AMPLITUDE)
+    orbit = _attained_in_engine(scene, speed)
+    return None if orbit is None else refined_orbit(orbit, AMPLITUDE)
 
 
-def _attained(scene: WheelsetScene, speed: float) -> Orbit | None:
-    return attained(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
+def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
+    return attained_cycle(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
     """A speed (m/s) above the one at which the branch begins; the scene's last speed where there is no branch."""
     last = float(scene.speeds.all().max())
-    return min(last, round(BESIDE[1] * orbits[0].speed, 2)) if orbits else last
+    return min(last, round(SPEED_SHARES[1] * orbits[0].speed, 2)) if orbits else last
 
 
-def cycles(
+def cycles_of_engines(
     scene: WheelsetScene, engines: Sequence[str], speed: float, *, error: bool = False
 ) -> tuple[dict[str, Result], dict[str, str]]:
     """One period of the refined limit cycle at a speed (m/s) in every engine, and reasons why some engines have none.
@@ -221,13 +231,13 @@ def cycles(
     estimated.
     """
     results, failed = dict[str, Result](), dict[str, str]()
-    first = _attained(scene, speed)
+    first = _attained_in_engine(scene, speed)
     if first is None:
         return results, failed
     for engine in engines:
         try:
             guess = guess_from_orbit(first, equations_of(scene, engine, speed))
-            orbit = refined(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
+            orbit = refined_orbit(solved_orbit(guess, AMPLITUDE, precise=False), AMPLITUDE)
             results[engine] = _one_period(scene, engine, orbit, error)
         except RunFailed as failure:
             failed[engine] = str(failure)
@@ -236,7 +246,7 @@ def cycles(
 
 def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
     """The result of a limit cycle over one period; its detail is the orbit."""
-    labelled = with_assumptions(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
+    labelled = with_assumptions(_labelled_result(scene, engine, orbit.path()), assumptions(orbit.equations))
     period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
     if not error:
         return period

@@ -24,7 +24,7 @@ WHEELS_OF_SCENE = {"reach", "spacing", "right_radius", "left_radius", "left_whee
 """Keys of [conicity] that say which wheels the scene has."""
 MOST_PLACES = 1000
 """Displacements on one side at which profiles are put on their rails: some hundredths of a second for each."""
-RADII = (0.1, 1.5)
+RADIUS_RANGE = (0.1, 1.5)
 """m: of a railway's wheels, with room."""
 MOST_CELLS = 200
 """Of FASTSIM, along each strip."""
@@ -146,8 +146,10 @@ def _check_conicity(scene: WheelsetScene) -> None:
         raise InputError(scene.file, "conicity.spacing", asked.spacing, allowed)
     for key in ("right_radius", "left_radius"):
         radius = getattr(asked, key)
-        if radius is not None and not RADII[0] <= radius <= RADII[1]:
-            raise InputError(scene.file, f"conicity.{key}", radius, f"must be from {RADII[0]:g} to {RADII[1]:g} m")
+        if radius is not None and not RADIUS_RANGE[0] <= radius <= RADIUS_RANGE[1]:
+            raise InputError(
+                scene.file, f"conicity.{key}", radius, f"must be from {RADIUS_RANGE[0]:g} to {RADIUS_RANGE[1]:g} m"
+            )
 
 
 def _check_run(scene: WheelsetScene) -> None:

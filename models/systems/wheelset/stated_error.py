@@ -21,7 +21,7 @@ from models.core.discretisation import (
     not_estimated,
     rows_at,
     size_of,
-    stated,
+    with_stated_errors,
 )
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
@@ -30,15 +30,15 @@ from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.assumptions import sums_by_wheel
 from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
 
-UNITS = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
+UNIT_OF_CHANNEL = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
 """Channels whose error is told; forces are the sum over the patches of a wheel."""
-ORDER, KINKED = 4, 2.0
+RK4_ORDER, KINKED_ORDER = 4, 2.0
 """Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
 OF_CELLS = 1.5
 """Order that is taken for the cells to use; their error falls with the first to the second power."""
-SHORT = 0.1
+HALF_STEP_SHARE = 0.1
 """Share of the path that half the step repeats where twice the step cannot be."""
-FEWEST = 5
+FEWEST_CELLS = 5
 """Cells from which on half of them are a net."""
 March = Callable[[WheelsetScene], WheelsetPath]
 """The path of a scene, by one engine at one speed."""
@@ -48,23 +48,29 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     """The result of a path with the errors of its principal channels; RunFailed where these are so large that it is no
     answer.
     """
-    fine, step = series(run.detail), scene.run.step
+    fine, step = principal_series(run.detail), scene.run.step
     if scene.contact.law == "linear":
-        return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
+        return estimated(
+            run,
+            fine,
+            lambda times, share: principal_series(march(with_step_factor(scene, times, share))),
+            RK4_ORDER,
+            step,
+        )
     cells = scene.contact.cells
-    other = coarser_cells(cells) if cells >= FEWEST else 2 * cells
+    other = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
     try:
         coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other} cells the path fails: {failure}")
     told = _of_steps(scene, march, fine, coarse)
-    for name, unit in UNITS.items():
-        gap = _gap(fine, coarse, name)
+    for name, unit in UNIT_OF_CHANNEL.items():
+        gap = _rms_difference(fine, coarse, name)
         told[f"{name} of cells"] = by_cells(gap, size_of(fine.channels[name]), unit, cells, OF_CELLS, MOST_CELLS)
-    return stated(run, told, f"a path on {other} cells and some steps of other length")
+    return with_stated_errors(run, told, f"a path on {other} cells and some steps of other length")
 
 
-def series(path: WheelsetPath) -> Series:
+def principal_series(path: WheelsetPath) -> Series:
     """Time series of the principal channels of a path."""
     forces = {
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
@@ -72,7 +78,7 @@ def series(path: WheelsetPath) -> Series:
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
-def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
+def with_step_factor(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
     """The scene with a step that is ``times`` as long, over a share of its path (whole steps), and with another number
     of cells.
     """
@@ -86,27 +92,35 @@ def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int |
 def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
     """The path on another number of cells, in twice the step where this is possible."""
     with suppress(InputError, RunFailed):
-        return series(march(changed(scene, 2.0, cells=cells)))
-    return series(march(changed(scene, 1.0, cells=cells)))
+        return principal_series(march(with_step_factor(scene, 2.0, cells=cells)))
+    return principal_series(march(with_step_factor(scene, 1.0, cells=cells)))
 
 
 def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
     """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
-    power = 2.0**KINKED
+    power = 2.0**KINKED_ORDER
     try:
-        part, share, remains = series(march(changed(scene, 2.0, FINE_WINDOW))), FINE_WINDOW, 1.0 / (power - 1.0)
+        part, share, remains = (
+            principal_series(march(with_step_factor(scene, 2.0, FINE_WINDOW))),
+            FINE_WINDOW,
+            1.0 / (power - 1.0),
+        )
     except (InputError, RunFailed):
-        part, share, remains = series(march(changed(scene, 0.5, SHORT))), SHORT, power / (power - 1.0)
+        part, share, remains = (
+            principal_series(march(with_step_factor(scene, 0.5, HALF_STEP_SHARE))),
+            HALF_STEP_SHARE,
+            power / (power - 1.0),
+        )
     end, told = share * scene.run.duration, {}
-    for name, unit in UNITS.items():
-        before, whole = _gap(fine, coarse, name, end), _gap(fine, coarse, name)
+    for name, unit in UNIT_OF_CHANNEL.items():
+        before, whole = _rms_difference(fine, coarse, name, end), _rms_difference(fine, coarse, name)
         grown = max(1.0, whole / before) if before > 0.0 else 1.0
-        error, size = remains * grown * _gap(fine, part, name), size_of(fine.channels[name])
-        told[name] = Estimate(error, unit, error / size if size > 0.0 else 0.0, KINKED, scene.run.step)
+        error, size = remains * grown * _rms_difference(fine, part, name), size_of(fine.channels[name])
+        told[name] = Estimate(error, unit, error / size if size > 0.0 else 0.0, KINKED_ORDER, scene.run.step)
     return told
 
 
-def _gap(fine: Series, other_series: Series, name: str, end: float = math.inf) -> float:
+def _rms_difference(fine: Series, other_series: Series, name: str, end: float = math.inf) -> float:
     """Root mean square of the difference between two series in one channel, up to a time (s), at the rows that both
     have.
     """
@@ -128,12 +142,12 @@ def with_error_of_cycles(
     for name, unit in units.items():
         size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
-        error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED - 1.0)
+        error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED_ORDER - 1.0)
         steps = [orbit.period / orbit.steps for orbit in orbits]
-        told[name] = Estimate(error, unit, error / size, KINKED, float(min(steps)))
+        told[name] = Estimate(error, unit, error / size, KINKED_ORDER, float(min(steps)))
         if coarse:
             gaps = [getattr(orbits[k], name) - getattr(other, name) for k, other in coarse.items()]
             left = LIKELY * float(np.sqrt(np.mean(np.square(gaps))))
             told[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
     some = f", and half the cells at {len(coarse)} of {len(orbits)} cycles" if coarse else ", none on fewer cells"
-    return stated(run, told, f"half the step at every cycle{some}")
+    return with_stated_errors(run, told, f"half the step at every cycle{some}")

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.measured.formats.mdf4 import unheard
+from models.measured.formats.mdf4 import suppressed_output
 from validation.measured.measured_files.csv import BACK
 from validation.measured.measured_files.odd import (
     COUNT,
@@ -61,7 +61,7 @@ def signals(
                 comment=family,
                 common_timebase=True,
             )
-        with unheard():
+        with suppressed_output():
             file.save(path, compression=compression)
             file.close()
         return path

@@ -14,21 +14,21 @@ Curves = dict[tuple[str, str], tuple[float, ...]]
 """Steps (s), tolerances or cells that are tried, by engine and method."""
 
 
-def curves(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
+def curves_of_methods(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
     """Settings of several methods of an engine, all with the same list of values."""
     return {(engine, method): values for method in methods}
 
 
-def ms(*steps: float) -> tuple[float, ...]:
+def milliseconds(*steps: float) -> tuple[float, ...]:
     """Steps (s) from milliseconds."""
     return tuple(1e-3 * step for step in steps)
 
 
-def each(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple[Setting, ...]:
+def settings_of_curves(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple[Setting, ...]:
     """One setting for each value of each curve."""
     return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
 
 
-def apart(channels: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
+def largest_differences(channels: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
     """Largest difference of each quantity from its reference."""
     return {name: float(np.abs(values - true[name]).max()) for name, values in channels.items()}

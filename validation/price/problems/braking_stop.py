@@ -22,27 +22,27 @@ from models.brake.pressure import Chambers, by_valves, resting_chambers
 from models.brake.quarter import braked
 from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
-from models.systems.braking.march import Braked, on_tyres
-from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import stacked
-from validation.braking.quarter_stops import FRONT, FrictionChange, FrictionCurve, marched_quarter
+from models.systems.braking.march import BrakedVehicle, on_tyres
+from models.tyre.magic_formula import table_of_surface
+from models.tyre.tyre_table import stacked_tables
+from validation.braking.quarter_stops import FRONT_WHEEL, FrictionChange, FrictionCurve, marched_quarter
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
-SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
+SURFACES, SURFACE_CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
 """Surfaces, where the second begins (m), speed at the start (m/s)."""
 REPLAY_SUBSTEPS = 64
 """Substeps of the run whose valves are replayed."""
 EXTRA_SAMPLES = 40
 """Samples for which the last valves are kept: time for schemes that stop late."""
-OURS, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
-WALKS = {OURS: 2, EULER: 1, RK4: 4, LITERAL: 1}
+OWN_METHOD, EULER, RK4, LITERAL = "exact wheel", "Euler", "RK4", "literal"
+CALLS_PER_STEP = {OWN_METHOD: 2, EULER: 1, RK4: 4, LITERAL: 1}
 """Force calls of a step; of ours, walks from node to node of the tyre's table."""
-DEFAULTS = {(OURS, Braked.substeps): "twinrig", (LITERAL, 1): "paper"}
+DEFAULT_METHODS = {(OWN_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1): "paper"}
 """Whose default a method with so many steps in a sample is."""
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
-FULL_STEPS = {OURS: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK = {OURS: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
+FULL_STEPS = {OWN_METHOD: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
+QUICK = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
 """The named share of FULL_STEPS that the quick report takes, from half the speed; the paper's own single step is far
 from where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
@@ -50,21 +50,21 @@ SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12
 
 
 @dataclass
-class Tape:
+class TapedController:
     """Wrapper of a controller that records the valve commands."""
 
-    inner: Controller
+    controller: Controller
     valves: list[int]
 
     def sample(self, sample: Sample) -> Command:
         """Command of the wrapped controller for a sample."""
-        command = self.inner.sample(sample)
+        command = self.controller.sample(sample)
         self.valves.append(int(np.asarray(command.valves)[0]))
         return Command(valves=np.array(self.valves[-1:]))
 
 
 @dataclass(frozen=True)
-class Played:
+class ReplayedController:
     """A controller that replays recorded valve commands and repeats the last one for ever."""
 
     valves: np.ndarray
@@ -100,19 +100,19 @@ class BrakingStop:
     )
 
     def __init__(self, quick: bool) -> None:
-        self.speed, self.change = (SPEED / 2, CHANGE / 4) if quick else (SPEED, CHANGE)
+        self.speed, self.change = (SPEED / 2, SURFACE_CHANGE / 4) if quick else (SPEED, SURFACE_CHANGE)
         self.title = (
             f"Anti-lock stop of a quarter vehicle from {self.speed:.4g} m/s, {SURFACES[0]} and from "
             f"{self.change:g} m on {SURFACES[1]}, valves replayed"
         )
         self.units, self.bound = {"stopping distance": "m"}, 10.0
         self.tolerances: tuple[float, ...] = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 1e-4)
-        self._tables = [surface(name) for name in SURFACES]
+        self._tables = [table_of_surface(name) for name in SURFACES]
         self.slips = np.unique(np.concatenate([table.slips for table in self._tables]))
         self.mu = np.array([np.interp(self.slips, table.slips, table.mu_x[0, 0]) for table in self._tables])
         self._road = road([Stretch(0.0, 0, 0), Stretch(self.change, 1, 1)])
         self._chambers, self._brakes = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY), of_wheels(PAPER_FRONT)
-        self.valves = self._taped()
+        self.valves = self._taped_commands()
         self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
@@ -128,25 +128,29 @@ class BrakingStop:
         """A setting: curve, and the longest step (s) up to ``value`` that divides a sample."""
         substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
         return Setting(
-            engine, method, SAMPLE / substeps, ORDERS.get(method, 0), default=DEFAULTS.get((method, substeps), "")
+            engine,
+            method,
+            SAMPLE / substeps,
+            ORDERS.get(method, 0),
+            default=DEFAULT_METHODS.get((method, substeps), ""),
         )
 
     def build(self, setting: Setting) -> StopSolver:
         """The stop by one method in steps."""
         substeps = round(SAMPLE / setting.value)
-        run = self._stop_by_twinrig if setting.method == OURS else partial(self._stop_by_method, setting.method)
+        run = self._stop_by_twinrig if setting.method == OWN_METHOD else partial(self._stop_by_method, setting.method)
         return StopSolver(partial(run, substeps))
 
     def errors(self, solution: StopResult) -> dict[str, float]:
         """Errors of a solution's stopping distance."""
         return {"stopping distance": abs(solution.distance - self.true)}
 
-    def _taped(self) -> np.ndarray:
+    def _taped_commands(self) -> np.ndarray:
         """Valve commands (n,) of the controller's own run, one per sample, with the last one repeated for some
         samples."""
-        tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
+        tape = TapedController(CONTROLLERS["slip_bang_bang"](1), [])
         vehicle = on_tyres(
-            FRONT.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
+            FRONT_WHEEL.plane, self._tables, self._brakes, self._chambers, self._road, substeps=REPLAY_SUBSTEPS
         )
         vehicle.run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * EXTRA_SAMPLES)
@@ -154,7 +158,9 @@ class BrakingStop:
     def _distance_by_scipy(self, method: str, tolerance: float) -> float:
         """Stopping distance (m) by scipy, where changes of friction, locking and release are events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
-        return tight_distance(FRONT, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
+        return tight_distance(
+            FRONT_WHEEL, PAPER_FRONT, stretches, ReplayedController(self.valves), self.speed, tolerance, method
+        )
 
     def _friction(self, i: int, slip: float) -> float:
         return float(np.interp(slip, self.slips, self.mu[i]))
@@ -169,10 +175,19 @@ class BrakingStop:
         return np.concatenate(torques)
 
     def _stop_by_twinrig(self, substeps: int) -> StopResult:
-        stop = braked(FRONT, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed)
-        if stop.rest < 0:
+        stop = braked(
+            FRONT_WHEEL,
+            stacked_tables(self._tables),
+            self._road,
+            self._torques(substeps),
+            SAMPLE / substeps,
+            self.speed,
+        )
+        if stop.step_of_rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return StopResult(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
+        return StopResult(
+            stop.distance, {"steps": stop.step_of_rest, "force calls": CALLS_PER_STEP[OWN_METHOD] * stop.step_of_rest}
+        )
 
     def _stop_by_method(self, method: str, substeps: int) -> StopResult:
         number = (EULER, RK4, LITERAL).index(method)
@@ -180,10 +195,10 @@ class BrakingStop:
         friction = FrictionChange(
             FrictionCurve(self.slips, self.mu[0]), FrictionCurve(self.slips, self.mu[1]), self.change
         )
-        way, steps, _ = marched_quarter(number, FRONT, torques, friction, self.speed, step)
+        way, steps, _ = marched_quarter(number, FRONT_WHEEL, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
-        return StopResult(way, {"steps": steps, "force calls": WALKS[method] * steps})
+        return StopResult(way, {"steps": steps, "force calls": CALLS_PER_STEP[method] * steps})
 
 
 @cache

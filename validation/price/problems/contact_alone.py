@@ -13,7 +13,7 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.contact.theories import beyond_friction
-from models.systems.contact.work_precision import WAYS, TheorySettings, force_of
+from models.systems.contact.work_precision import THEORIES_COMPARED, TheorySettings, force_of
 from validation.contact.contact_set import read_contacts
 
 CONTACT_SPACING = 23
@@ -66,7 +66,7 @@ class ContactAlone:
 
     def __init__(self) -> None:
         self._cases = read_contacts()[::CONTACT_SPACING]
-        self._ways = {CURVES[way.name]: way for way in WAYS}
+        self._ways = {CURVES[way.name]: way for way in THEORIES_COMPARED}
         self._forces = np.array([case.force for case in self._cases])
         self.title = f"Creep forces of {len(self._cases)} contacts by every theory of rolling contact"
         self.units = {"mean creep force": "% of mu N", "creep force in 95 of 100": "% of mu N"}

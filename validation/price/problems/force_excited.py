@@ -13,16 +13,16 @@ from functools import cache
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.model import Model
 from models.engines.protocol import build
-from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble
-from validation.price.problems import Curves, apart, curves, each, ms
+from models.systems.pitch_plane.scene import assembly_of_scene
+from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
 from validation.price.problems.road_excited import MUJOCO, SPEED, judge, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0
@@ -30,29 +30,29 @@ DURATION, RATE = 2.0, 100.0
 PERIOD = 1 / RATE
 FINE_STEP = PERIOD / 1280
 """Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
-STEPS = ms(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
+STEPS = milliseconds(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
 FULL_STEPS: Curves = {
     ("reference", "RK4"): STEPS,
     ("exudyn", "RK44"): STEPS[:-1],
-    **curves("exudyn", STEPS, "ExplicitMidpoint", "ExplicitEuler"),
-    ("exudyn", "GeneralizedAlpha 0.9"): (*ms(10), *STEPS),
-    **curves("exudyn", STEPS[:-1], "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
+    **curves_of_methods("exudyn", STEPS, "ExplicitMidpoint", "ExplicitEuler"),
+    ("exudyn", "GeneralizedAlpha 0.9"): (*milliseconds(10), *STEPS),
+    **curves_of_methods("exudyn", STEPS[:-1], "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
     ("mujoco", "RK4"): STEPS[:-1],
     ("mujoco", "Euler"): STEPS,
-    **curves("mujoco", STEPS[:-1], "implicit", "implicitfast", "discrete"),
+    **curves_of_methods("mujoco", STEPS[:-1], "implicit", "implicitfast", "discrete"),
 }
 """Steps (s) of every method; the finest is for the engines' defaults and those whose order shows late."""
 QUICK: Curves = {
-    ("reference", "RK4"): ms(0.5, 0.25, 0.125),
-    ("exudyn", "ExplicitEuler"): ms(1, 0.5, 0.25),
-    ("mujoco", "Euler"): ms(2, 1, 0.5),
+    ("reference", "RK4"): milliseconds(0.5, 0.25, 0.125),
+    ("exudyn", "ExplicitEuler"): milliseconds(1, 0.5, 0.25),
+    ("mujoco", "Euler"): milliseconds(2, 1, 0.5),
 }
 """The named share of FULL_STEPS that the quick report takes."""
 GUIDED: Curves = {
     ("reference", "RK4"): STEPS,
-    **curves("exudyn", (*ms(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
-    ("exudyn", "RK44"): ms(1),
-    **curves("mujoco", STEPS[:-2], *MUJOCO),
+    **curves_of_methods("exudyn", (*milliseconds(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
+    ("exudyn", "RK44"): milliseconds(1),
+    **curves_of_methods("mujoco", STEPS[:-2], *MUJOCO),
 }
 """With the pitch prescribed. RK44 is there to be refused: it does not solve for that. MuJoCo calls Python in every
 step."""
@@ -62,7 +62,7 @@ SEED, DEVIATION = 77, 100.0
 
 def driven() -> Assembly:
     """The vehicle without a road, driven by the wheel forces of its run on the road."""
-    on_road = assemble(scene(DURATION))
+    on_road = assembly_of_scene(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", PERIOD / 80, DURATION))
     forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], PERIOD, held=False)
     return replace(on_road.without_tyres().with_input("force", forces), assumptions=())  # those of the road are gone
@@ -93,7 +93,7 @@ class ForceExcited:
             self._sampled(build("reference", self.assembly, settings).run())
             for settings in (Settings("RK4", FINE_STEP, DURATION), other)
         )
-        self.uncertainty = apart(check, self._true)
+        self.uncertainty = largest_differences(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
 
     def driven(self) -> Assembly:
@@ -111,7 +111,7 @@ class ForceExcited:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """All settings, or their named share."""
-        return each(self.quick if quick else self.full, self.setting)
+        return settings_of_curves(self.quick if quick else self.full, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem: curve, and the longest step (s) up to ``value`` such that every force sample falls
@@ -126,7 +126,7 @@ class ForceExcited:
         """Largest error of each quantity at the force samples, which lie on steps; the run's assumptions are
         checked."""
         judge(self.assembly, solution)
-        return apart(self._sampled(solution), self._true)
+        return largest_differences(self._sampled(solution), self._true)
 
 
 class NoisyForces(ForceExcited):
@@ -143,12 +143,12 @@ class NoisyForces(ForceExcited):
         """The vehicle driven by forces with noise on them."""
         clean = driven()
         assert isinstance(clean.input, Sampled)
-        noise = DEVIATION * normal(SEED, 0, *clean.input.values.shape)
+        noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
         return replace(clean, input=Sampled(clean.input.values + noise, PERIOD, held=False))
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
         """Both suspension forces and the states of a run."""
-        channels = outputs(self.assembly, run)
+        channels = output_channels(self.assembly, run)
         return {"suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]), "state": run.states}
 
 
@@ -170,7 +170,7 @@ class PrescribedPitch(ForceExcited):
         """The vehicle with forces and pitch as inputs, on the pitch at the start."""
         forces = driven()
         assert isinstance(forces.input, Sampled)
-        run = build("reference", assemble(scene(DURATION)), Settings("RK4", PERIOD / 80, DURATION)).run()
+        run = build("reference", assembly_of_scene(scene(DURATION)), Settings("RK4", PERIOD / 80, DURATION)).run()
         pitch = Smooth(run.states[::80, 3, None], PERIOD, derivatives=2, degree=5)
         guided = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
         guided.initial[[3, 7]] = pitch.at(0.0)[:2]

@@ -22,7 +22,7 @@ from models.engines.spatial_reference import SpatialReference
 from models.systems.ride.nonlinear import row_of
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.price.problems import Curves, apart, curves, each, ms
+from validation.price.problems import Curves, curves_of_methods, largest_differences, milliseconds, settings_of_curves
 from validation.price.problems.road_excited import setting, settings_of
 
 DURATION, SPEED = 0.5, 20.0
@@ -36,19 +36,19 @@ RISE_PLACE, RISE_LENGTH = 3.0, 0.5
 GRID = 20e-3
 """Spacing (s) of the instants that are compared, which every step meets."""
 GRAVITY = 9.81
-_LONG_STEPS = ms(20, 10, 20 / 3, 5, 4, 2)
-_MIDDLE_STEPS = ms(10, 5, 4, 2.5, 2, 1)
-_SHORT_STEPS = ms(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
-_NATIVE = ms(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
+_LONG_STEPS = milliseconds(20, 10, 20 / 3, 5, 4, 2)
+_MIDDLE_STEPS = milliseconds(10, 5, 4, 2.5, 2, 1)
+_SHORT_STEPS = milliseconds(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
+_NATIVE = milliseconds(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
 FULL_STEPS: Curves = {
     ("exudyn", "RK44"): _LONG_STEPS,
-    ("exudyn", "ExplicitMidpoint"): ms(10, 20 / 3, 5, 4, 2.5, 2),
+    ("exudyn", "ExplicitMidpoint"): milliseconds(10, 20 / 3, 5, 4, 2.5, 2),
     ("exudyn", "ExplicitEuler"): _SHORT_STEPS,
     ("exudyn", "VelocityVerlet"): _MIDDLE_STEPS,
-    **curves("exudyn", _LONG_STEPS, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
-    **curves("exudyn", (1e-6,), "DOPRI5", "ODE23"),
+    **curves_of_methods("exudyn", _LONG_STEPS, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
+    **curves_of_methods("exudyn", (1e-6,), "DOPRI5", "ODE23"),
     ("mujoco", "RK4"): _NATIVE,
-    **curves("mujoco", _NATIVE[1:], "Euler", "implicit", "implicitfast", "discrete"),
+    **curves_of_methods("mujoco", _NATIVE[1:], "Euler", "implicit", "implicitfast", "discrete"),
 }
 """Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
 to be refused: the road is read at half steps."""
@@ -103,7 +103,7 @@ class FreeVehicle:
             self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCES, strict=True)
         )
         self._true = self.read(self.states, self.instants)
-        self.uncertainty = apart(self.read(self.others, self.instants), self._true)
+        self.uncertainty = largest_differences(self.read(self.others, self.instants), self._true)
         self.bound = 10 * float(np.abs(self._true["wheel load"]).max())
 
     def road(self, times: ArrayLike) -> np.ndarray:
@@ -145,7 +145,7 @@ class FreeVehicle:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """The settings FULL_STEPS, also in the quick share, since the reference alone takes seconds."""
-        return each(FULL_STEPS, self.setting)
+        return settings_of_curves(FULL_STEPS, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps; or
@@ -166,7 +166,7 @@ class FreeVehicle:
         """Largest error of any wheel load and of any acceleration at the compared instants."""
         every = round(GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::every]
-        return apart(self.read(states, self.instants), self._true)
+        return largest_differences(self.read(states, self.instants), self._true)
 
 
 @cache

@@ -11,8 +11,15 @@ from functools import cache
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.sensors.rotations import Rule, conjugate, from_cardan, integrate, logarithm, product
-from validation.price.problems import Curves, curves, each
+from models.sensors.rotations import (
+    Rule,
+    conjugate_quaternion,
+    from_cardan,
+    integrate,
+    quaternion_product,
+    rotation_vector,
+)
+from validation.price.problems import Curves, curves_of_methods, settings_of_curves
 from validation.price.problems.road_excited import DEFAULTS, STAGES
 from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
 
@@ -35,13 +42,13 @@ ADAPTIVE = ("DOPRI5", "ODE23")
 _RATES, _FEW_RATES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
 FULL_RATES: Curves = {
-    **curves("reference", _RATES, *RULES),
-    **curves("exudyn", _FEW_RATES, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
-    **curves("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
+    **curves_of_methods("reference", _RATES, *RULES),
+    **curves_of_methods("exudyn", _FEW_RATES, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
+    **curves_of_methods("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
     ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),
-    **curves("exudyn", (100.0,), *ADAPTIVE),
+    **curves_of_methods("exudyn", (100.0,), *ADAPTIVE),
     ("mujoco", "Euler"): (*_NATIVE, 500.0),
-    **curves("mujoco", (4.0, *_NATIVE[:-1]), "RK4", "implicit", "implicitfast", "discrete"),
+    **curves_of_methods("mujoco", (4.0, *_NATIVE[:-1]), "RK4", "implicit", "implicitfast", "discrete"),
 }
 """Samples per second of every method; the last two of Exudyn are there to be refused."""
 QUICK: Curves = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
@@ -95,7 +102,9 @@ def magnus(step: float) -> np.ndarray:
 
 def apart(computed: np.ndarray, true: np.ndarray) -> float:
     """Largest angle (rad) between computed and true attitudes (n, 4)."""
-    return float(np.linalg.norm(logarithm(product(conjugate(computed), true)), axis=-1).max())
+    return float(
+        np.linalg.norm(rotation_vector(quaternion_product(conjugate_quaternion(computed), true)), axis=-1).max()
+    )
 
 
 @dataclass(frozen=True)
@@ -136,7 +145,9 @@ class InertialUnit:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL_RATES, or its named share QUICK."""
-        return each(QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate))
+        return settings_of_curves(
+            QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate)
+        )
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps."""

@@ -24,10 +24,10 @@ from models.engines.model import Model
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
 from models.systems.pitch_plane.assumptions import assumptions
-from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.run import output_channels
+from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.price.problems import Curves, curves, each, ms
+from validation.price.problems import Curves, curves_of_methods, milliseconds, settings_of_curves
 
 DURATION, SPEED = 2.0, 20.0
 GRID = 1.25e-4
@@ -50,7 +50,7 @@ DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Eule
 """What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
 
 MUJOCO = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
-_STEPS = ms(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
+_STEPS = milliseconds(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
 _TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 FULL_STEPS: Curves = {
     ("reference", "RK4"): _STEPS,
@@ -58,26 +58,28 @@ FULL_STEPS: Curves = {
     ("reference", "Radau"): (1e-1, 1e-2, *_TOLERANCES[:-2]),
     ("reference", "LSODA"): _TOLERANCES,
     ("exudyn", "RK44"): _STEPS,
-    ("exudyn", "RK67"): ms(5, 4, 2.5, 2, 1.25, 1, 0.625),
-    ("exudyn", "RK33"): ms(5, 4, 2.5, 2, 1.25, 1, 0.5, 0.25),
-    **curves("exudyn", _STEPS, "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
-    **curves("exudyn", (*ms(10), *_STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
+    ("exudyn", "RK67"): milliseconds(5, 4, 2.5, 2, 1.25, 1, 0.625),
+    ("exudyn", "RK33"): milliseconds(5, 4, 2.5, 2, 1.25, 1, 0.5, 0.25),
+    **curves_of_methods("exudyn", _STEPS, "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
+    **curves_of_methods(
+        "exudyn", (*milliseconds(10), *_STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6", "TrapezoidalIndex2"
+    ),
     ("exudyn", "DOPRI5"): (1e-2, *_TOLERANCES),
     ("exudyn", "DVERK6"): (1e-6,),
     ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
-    **curves("mujoco", _STEPS, *MUJOCO),
+    **curves_of_methods("mujoco", _STEPS, *MUJOCO),
 }
 QUICK: Curves = {
-    ("reference", "RK4"): ms(4, 2, 1, 0.5, 0.25),
+    ("reference", "RK4"): milliseconds(4, 2, 1, 0.5, 0.25),
     ("reference", "LSODA"): (1e-3, 1e-4, 1e-6),
-    ("exudyn", "RK44"): ms(5, 4, 2, 1, 0.5, 0.25),
-    ("exudyn", "ExplicitEuler"): ms(5, 1, 0.5, 0.25),
-    ("exudyn", "GeneralizedAlpha 0.9"): ms(10, 2, 1, 0.5),
+    ("exudyn", "RK44"): milliseconds(5, 4, 2, 1, 0.5, 0.25),
+    ("exudyn", "ExplicitEuler"): milliseconds(5, 1, 0.5, 0.25),
+    ("exudyn", "GeneralizedAlpha 0.9"): milliseconds(10, 2, 1, 0.5),
     ("exudyn", "DOPRI5"): (1e-3, 1e-4),
     ("exudyn", "DVERK6"): (1e-6,),
-    ("mujoco", "RK4"): ms(4, 2, 1, 0.5, 0.25),
-    ("mujoco", "Euler"): ms(5, 2, 1, 0.5, 0.25),
-    **curves("mujoco", ms(2, 1, 0.5), "implicit", "implicitfast"),
+    ("mujoco", "RK4"): milliseconds(4, 2, 1, 0.5, 0.25),
+    ("mujoco", "Euler"): milliseconds(5, 2, 1, 0.5, 0.25),
+    **curves_of_methods("mujoco", milliseconds(2, 1, 0.5), "implicit", "implicitfast"),
 }
 """The named share of FULL_STEPS that the quick report takes: each engine's default and fourth-order method, one
 adaptive solver, one that is unstable, one that is refused."""
@@ -101,7 +103,7 @@ def scene(duration: float = DURATION):
 
 def judge(assembly: Assembly, run: Trajectory) -> Result:
     """Result of a run with the assumptions that it broke."""
-    channels = outputs(replace(assembly, sensors=()), run)
+    channels = output_channels(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     times = {"time": Channel("time", run.times, "s")}
     return with_assumptions(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
@@ -122,7 +124,7 @@ def setting(engine: str, method: str, value: float) -> Setting:
 
 def settings(quick: bool) -> tuple[Setting, ...]:
     """FULL_STEPS, or its named share QUICK."""
-    return each(QUICK if quick else FULL_STEPS, setting)
+    return settings_of_curves(QUICK if quick else FULL_STEPS, setting)
 
 
 def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
@@ -167,7 +169,7 @@ class RoadExcited:
             f"fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
-        self.assembly = assemble(scene())
+        self.assembly = assembly_of_scene(scene())
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
         self._solution = dense(self.assembly, *solvers[0])

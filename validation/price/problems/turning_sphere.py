@@ -20,7 +20,7 @@ from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_system import items, solve, solver_counts
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import without_warnings
-from models.sensors.rotations import from_matrix, logarithm, product
+from models.sensors.rotations import from_matrix, quaternion_product, rotation_vector
 
 KINDS = exu.OutputVariableType
 Gyro = Callable[[np.ndarray], np.ndarray]
@@ -92,9 +92,9 @@ def _sphere(
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
-        kind, attitude, rates = items.NodeRigidBodyEP, start, 0.5 * product(start, turning)
+        kind, attitude, rates = items.NodeRigidBodyEP, start, 0.5 * quaternion_product(start, turning)
     else:
-        kind, attitude, rates = items.NodeRigidBodyRotVecLG, logarithm(start), rate
+        kind, attitude, rates = items.NodeRigidBodyRotVecLG, rotation_vector(start), rate
     node = mbs.AddNode(kind(referenceCoordinates=still + attitude.tolist(), initialVelocities=still + rates.tolist()))
     body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     row = [0]

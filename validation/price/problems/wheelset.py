@@ -29,7 +29,7 @@ from models.engines.mujoco_quiet import installed
 from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
-from validation.contact.slow_wheels import counting
+from validation.contact.slow_wheels import counting_calls
 from validation.price.force_calls import AT_START
 from validation.price.problems.road_excited import STAGES, setting
 
@@ -223,8 +223,8 @@ class RollingWheels:
 
     def _exudyn(self, setting: Setting, method: str) -> WheelsetSolver:
         calls, law = [0], Forces(self.wheels)
-        slopes = counting(law.slopes, calls, SLOPE_EVALUATIONS) if setting.method.endswith(WITH_SLOPES) else None
-        rolling = Rolling(self.wheels, counting(law.of, calls), slopes=slopes)
+        slopes = counting_calls(law.slopes, calls, SLOPE_EVALUATIONS) if setting.method.endswith(WITH_SLOPES) else None
+        rolling = Rolling(self.wheels, counting_calls(law.of, calls), slopes=slopes)
         steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 

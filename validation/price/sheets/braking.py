@@ -7,10 +7,10 @@ import numpy as np
 from models.brake.brake import PAPER_FRONT
 from models.brake.controller import SAMPLE
 from models.brake.plane_vehicle import GRAVITY
-from validation.braking.quarter_stops import FRONT
+from validation.braking.quarter_stops import FRONT_WHEEL
 from validation.braking.sampled_quarter import EMPTY, FILL, LAST_SPEED, SUPPLY
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import CHANGE, SPEED, SURFACES
+from validation.price.problems.braking_stop import SPEED, SURFACE_CHANGE, SURFACES
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
 
@@ -18,8 +18,8 @@ BODY = f"""A wheel, and the mass that it carries, are braked straight ahead:
 
     m u' = -F        J w' = r F - T        x' = u        F = m g mu(slip)        slip = 1 - r w / u, held to 0 .. 1
 
-mu is linear between the lines of `braking_friction.csv`, whose second column holds up to x = {CHANGE:g} m, the third
-({SURFACES[1]}) behind it. A wheel that stops, w = 0, stands as long as T >= r F with slip 1.
+mu is linear between the lines of `braking_friction.csv`, whose second column holds up to x = {SURFACE_CHANGE:g} m, the
+third ({SURFACES[1]}) behind it. A wheel that stops, w = 0, stands as long as T >= r F with slip 1.
 
 Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * SAMPLE:g} ms a valve of
 `braking_valves.csv` is set (the last one for ever):
@@ -29,8 +29,9 @@ Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * 
     up(p) = {PAPER_FRONT.rising:g} max(p - {PAPER_FRONT.push_out:g}, 0)
     down(p) = {PAPER_FRONT.falling:g} max(p - {PAPER_FRONT.release:g}, 0)
 
-with T before that at the start of the sample. Parameters (SI): m = {FRONT.mass:.17g}, r = {FRONT.radius:.17g},
-J = {FRONT.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u / r.
+with T before that at the start of the sample. Parameters (SI): m = {FRONT_WHEEL.mass:.17g}, r =
+{FRONT_WHEEL.radius:.17g}, J = {FRONT_WHEEL.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u
+/ r.
 
 Asked for: the stopping distance. After the first sample that ends at u <= {LAST_SPEED:g} m/s the wheel stands, and the
 rest of the way is u^2 / (2 g mu(1))."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from models.engines.assembly import Settings
 from models.engines.protocol import build
-from models.road.study import WINDOW, study_road
+from models.road.study import FADE_IN_LENGTH, study_road
 from validation.price.problems import force_excited, road_excited
 from validation.price.problems.force_excited import DURATION, FINE_STEP, PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
@@ -27,7 +27,7 @@ z positive down, the pitch p positive nose up; f1, f2 are the wheel forces, posi
 ON_ROAD = f"""
     f1 = k1 (z1 - r(s)) + d1 (z1' - v r'(s))                s = v t
     f2 = k2 (z2 - r(s - l)) + d2 (z2' - v r'(s - l))        l = a + b
-    r(s) = -w(s / {WINDOW:g} m) sum_i A_i sin(W_i s + P_i)  for s > 0, else 0
+    r(s) = -w(s / {FADE_IN_LENGTH:g} m) sum_i A_i sin(W_i s + P_i)  for s > 0, else 0
     w(x) = 10 x^3 - 15 x^4 + 6 x^5  for x < 1, else 1
 
 r is the road, positive down; A_i [m], W_i [rad/m], P_i [rad] are the lines of `road.csv`; v = {SPEED:g} m/s. M is zero.

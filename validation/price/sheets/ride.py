@@ -26,7 +26,9 @@ def write(folder: Path) -> list[Value]:
             **dict(zip("AVPHE", vehicle.read, strict=True)),
         },
     )
-    sure = problem.truth * max(0.5 * problem.uncertainty, float(np.abs(ride.direct(problem) / problem.truth - 1).max()))
+    sure = problem.truth * max(
+        0.5 * problem.uncertainty, float(np.abs(ride.direct_deviations(problem) / problem.truth - 1).max())
+    )
     values = [
         Value("ride", output.name, output.unit, 0.0, *map(float, known))
         for output, *known in zip(vehicle.outputs, problem.truth, sure, strict=True)

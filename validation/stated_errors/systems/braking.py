@@ -12,38 +12,38 @@ from models.core.discretisation import errors_of
 from models.core.errors import RunFailed
 from models.systems.braking import ENGINES
 from models.systems.braking.errors import motion_and_distance
-from models.systems.braking.march import Braked, BrakingPath
+from models.systems.braking.march import BrakedVehicle, BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
-from validation.stated_errors.sample import Sample, drawn
+from validation.stated_errors.sample import Sample, drawn_samples
 
-FINER = 100
+FINER_STEPS = 100
 """Times as many steps in the truth."""
 SURFACES = {"ice": 0.15, "snow": 0.25, "wet": 0.6, "dry": 0.7}
 """With the friction by which circles are drawn."""
 CONTROLLERS = ("none", "slip_bang_bang", "acceleration_phases", "slip_pi")
-AXLE = {"track": 1.9, "radius": 0.5, "spin_inertia": 13.35, "roll_share": 0.5}
-TRAILER = {
+AXLE_DATA = {"track": 1.9, "radius": 0.5, "spin_inertia": 13.35, "roll_share": 0.5}
+TRAILER_DATA = {
     "mass": 7000.0,
     "yaw_inertia": 20000.0,
     "height": 1.2,
     "drawbar": 2.5,
     "drawbar_mass": 600.0,
     "drawbar_inertia": 600.0,
-    "front": {"x": 2.2, **AXLE},
-    "rear": {"x": -2.2, **AXLE},
+    "front": {"x": 2.2, **AXLE_DATA},
+    "rear": {"x": -2.2, **AXLE_DATA},
 }
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from stops that come to an end, also those whose result states no error."""
-    return drawn(count, seed, _draw_stop)
+    return drawn_samples(count, seed, _draw_stop)
 
 
 def _draw_stop(random: np.random.Generator) -> Sample:
     """Sample from one random stop; raises if the tyres cannot hold the circle or the vehicle rolls over."""
     engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
-    return _sample(scene, engine)
+    return _sample_of_stop(scene, engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
@@ -65,16 +65,16 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
             "rear": {"gradient": random.uniform(600.0, 1500.0), "push_out": 0.25},
         },
         "controller": {"kind": kind},
-        "procedures": {"stop": _procedure(random, surface)},
+        "procedures": {"stop": _random_procedure(random, surface)},
         "run": {"sample": float(random.choice([0.004, 0.0055, 0.01])), "substeps": steps},
     }
     if random.random() < 0.2:
-        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _of_car(random)}
+        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _random_brakes(random)}
     table["vehicle"] = {"override": {"mass": random.uniform(4500.0, 9000.0), "yaw_inertia": random.uniform(2e4, 4e4)}}
     effects = {
         "load_transfer": {},
         "pressure": {"fill": random.uniform(0.05, 0.25), "empty": random.uniform(0.05, 0.2)},
-        "trailer": TRAILER,
+        "trailer": TRAILER_DATA,
         "relaxation": {"front": random.uniform(0.2, 0.6), "rear": random.uniform(0.2, 0.6)},
     }
     shares = (0.7, 0.8, 0.25, 0.2)
@@ -83,13 +83,13 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _of_car(random: np.random.Generator) -> dict[str, Any]:
+def _random_brakes(random: np.random.Generator) -> dict[str, Any]:
     """Random brakes for a vehicle on its suspension."""
     gradient = random.uniform(200.0, 600.0)
     return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
 
 
-def _procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
+def _random_procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
     kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
     radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
     other = str(random.choice([name for name in SURFACES if name != surface]))
@@ -97,9 +97,9 @@ def _procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
     return {"kind": kind, "speed": speed, **of_kind.get(kind, {})}
 
 
-def _sample(scene: BrakingScene, engine: str) -> Sample:
+def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
     """Run a scene with its stated error, and compute its true error by a finer run."""
-    with counted() as calls:
+    with counted_steps() as calls:
         try:
             told = run(scene, engine, error=True)
         except RunFailed as error:
@@ -108,7 +108,7 @@ def _sample(scene: BrakingScene, engine: str) -> Sample:
             told = error.partial
     errors, true = errors_of(told), dict[str, float]()
     if errors:
-        most = scene.run.model_copy(update={"substeps": FINER * scene.run.substeps})
+        most = scene.run.model_copy(update={"substeps": FINER_STEPS * scene.run.substeps})
         truth = run(scene.model_copy(update={"run": most}), "mujoco" if scene.vehicle.file else "reference").detail
         fine, exact = motion_and_distance(told.detail, told.times), motion_and_distance(truth, told.times)
         true = {name: float(np.sqrt(np.mean((fine[name] - exact[name]) ** 2))) for name in errors}
@@ -116,14 +116,14 @@ def _sample(scene: BrakingScene, engine: str) -> Sample:
 
 
 @contextmanager
-def counted() -> Iterator[list[float]]:
+def counted_steps() -> Iterator[list[float]]:
     """Context that counts the steps of every run."""
-    calls, march = list[float](), Braked.run
+    calls, march = list[float](), BrakedVehicle.run
 
-    def counting(vehicle: Braked, *given: Any) -> BrakingPath:
+    def counting(vehicle: BrakedVehicle, *given: Any) -> BrakingPath:
         path = march(vehicle, *given)
         calls.append(float(vehicle.substeps * (len(path.times) - 1)))
         return path
 
-    with mock.patch.object(Braked, "run", counting):
+    with mock.patch.object(BrakedVehicle, "run", counting):
         yield calls

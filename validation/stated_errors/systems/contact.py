@@ -11,26 +11,26 @@ import numpy as np
 from models.contact.accuracy import coarser_cells
 from models.contact.theories import RollingContact
 from models.core.discretisation import errors_of
-from models.systems.contact.run import POWERS, run
+from models.systems.contact.run import CELL_POWER, run
 from models.systems.contact.scene import ContactScene, build
-from models.systems.contact.stated_error import rms
-from validation.stated_errors.sample import Sample, drawn
+from models.systems.contact.stated_error import finite_rms
+from validation.stated_errors.sample import Sample, drawn_samples
 
-MORE, MOST, OF_EXACT = 10, 400, 60
+FINER_CELLS, MOST_CELLS, OF_EXACT = 10, 400, 60
 """Cells of the truths divided by those of the run; cells at most, along each axis, and those of the exact theory."""
 THEORIES = ("fastsim", "fastsim", "fastsim", "simplified", "exact")
-LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
+LEAST_CELLS, LARGEST_CELLS = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 """Cells along each axis."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random scenes; scenes that are refused are replaced by others."""
-    return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
+    return drawn_samples(count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
 
 
 def _draw_scene(rng: np.random.Generator) -> ContactScene:
     theory = str(rng.choice(THEORIES))
-    method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST, LARGEST[theory]))}
+    method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST_CELLS, LARGEST_CELLS[theory]))}
     if theory == "fastsim":
         method["march"] = str(rng.choice(["second-order", "second-order", "plain"]))
         method["bound"] = str(rng.choice(["intermediate", "parabolic", "elliptic"]))
@@ -52,19 +52,21 @@ def _draw_scene(rng: np.random.Generator) -> ContactScene:
     return build(table)
 
 
-def _sample(scene: ContactScene) -> Sample:
+def _sample_of_contact(scene: ContactScene) -> Sample:
     run_ = run(scene, error=True)
     body, motions, cells = run_.detail.contact, run_.detail.motions, scene.method.cells
-    most = OF_EXACT if scene.method.name == "exact" else MOST
-    truth = np.array([_rolled(body, motion, min(MORE * cells, most)) for motion in motions])
+    most = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
+    truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most)) for motion in motions])
     gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
-    true = {"force": rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": rms(gap[:, 2])}
-    power = POWERS[scene.method.name] or 0
+    true = {"force": finite_rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": finite_rms(gap[:, 2])}
+    power = CELL_POWER[scene.method.name] or 0
     name = f"{scene.method.name} on {cells} cells, {len(motions)} motions"
     calls = len(motions) * float(cells) ** power
     return Sample(name, "", errors_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)
 
 
-def _rolled(body: RollingContact, motion: tuple[float, float, float], cells: int) -> tuple[float, float, float]:
+def _forces_of_motion(
+    body: RollingContact, motion: tuple[float, float, float], cells: int
+) -> tuple[float, float, float]:
     forces = body.roll(motion, cells)
     return forces.fx, forces.fy, forces.mz

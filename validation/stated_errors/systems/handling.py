@@ -14,24 +14,24 @@ from models.core.result import Result
 from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import ENGINES, FreeModel
 from models.multibody.forces import CELLS
-from models.systems.handling.run import Drive, drive_run, principal, run
+from models.systems.handling.run import Drive, drive_run, principal_series, run
 from models.systems.handling.scene import HandlingScene, build
-from validation.stated_errors.sample import Sample, drawn
+from validation.stated_errors.sample import Sample, drawn_samples
 
-CELL, STEP = 10, 8
+FINER_CELLS, FINER_STEPS = 10, 8
 """Times that the truth is finer in cells along the patch, and in steps."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random manoeuvres whose runs come to an end."""
-    return drawn(count, seed, _draw_manoeuvre)
+    return drawn_samples(count, seed, _draw_manoeuvre)
 
 
 def _draw_manoeuvre(random: np.random.Generator) -> Sample:
     """Sample from one random manoeuvre; raises if the tyres cannot be integrated with the step, before an error is
     estimated."""
     engine = str(random.choice(ENGINES))
-    return _sample(build(_table(random), "drawn.toml"), engine)
+    return _sample_of_drive(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
@@ -56,9 +56,9 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _sample(scene: HandlingScene, engine: str) -> Sample:
+def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
     """A run with its stated error, and the true error by a finer run."""
-    with counted() as calls:
+    with counted_forces() as calls:
         try:
             told = run(scene, engine, error=True)
         except RunFailed as error:
@@ -72,19 +72,19 @@ def _sample(scene: HandlingScene, engine: str) -> Sample:
 def _true_errors(scene: HandlingScene, drive: Drive, engine: str, stated_result: Result) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
     manoeuvre = scene.manoeuvres["drawn"]
-    fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
-    truth = principal(
-        drive_run(engine, fine.handling("drawn"), manoeuvre.speed, manoeuvre.duration, scene.run.step / STEP)
+    fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": FINER_CELLS * scene.tyres.cells})})
+    truth = principal_series(
+        drive_run(engine, fine.handling("drawn"), manoeuvre.speed, manoeuvre.duration, scene.run.step / FINER_STEPS)
     )
     return {
-        name: float(np.sqrt(np.mean((values - truth.channels[name][::STEP]) ** 2)))
-        for name, values in principal(drive).channels.items()
+        name: float(np.sqrt(np.mean((values - truth.channels[name][::FINER_STEPS]) ** 2)))
+        for name, values in principal_series(drive).channels.items()
         if name in errors_of(stated_result)
     }
 
 
 @contextmanager
-def counted() -> Iterator[list[float]]:
+def counted_forces() -> Iterator[list[float]]:
     """Context that counts, for every run, evaluations of the forces times cells of the tyres' contact grids."""
     calls, march = list[float](), FreeModel.run
 

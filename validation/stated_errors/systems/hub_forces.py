@@ -16,23 +16,23 @@ from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.trajectory import Trajectory
 from models.engines.cut_vehicle import ENGINES, HubModel
-from models.systems.hub_forces.run import principal, run
+from models.systems.hub_forces.run import principal_series, run
 from models.systems.hub_forces.scene import HubScene, build
-from validation.stated_errors.sample import Sample, drawn
+from validation.stated_errors.sample import Sample, drawn_samples
 
-FINER = 12
+FINER_STEPS = 12
 """Times that the truth's steps are shorter."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random scenes whose runs come to an end."""
-    return drawn(count, seed, _draw_scene)
+    return drawn_samples(count, seed, _draw_scene)
 
 
 def _draw_scene(random: np.random.Generator) -> Sample:
     """Sample from one random scene; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
-    return _sample(build(_table(random), "drawn.toml"), engine)
+    return _sample_of_run(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
@@ -61,9 +61,9 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _sample(scene: HubScene, engine: str) -> Sample:
+def _sample_of_run(scene: HubScene, engine: str) -> Sample:
     """Run a scene with its stated error, and compute its true error by a finer run."""
-    with counted() as calls:
+    with counted_forces() as calls:
         told = _run_with_error(scene, engine)
     errors, plain = errors_of(told), 2 * scene.steps
     names = list(errors)
@@ -85,17 +85,17 @@ def _run_with_error(scene: HubScene, engine: str) -> Result:
 
 def _true_errors(scene: HubScene, engine: str, stated_result: Result, names: list[str]) -> dict[str, float]:
     """True errors of every channel whose error is stated."""
-    fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
+    fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER_STEPS})})
     vehicle = scene.cut_vehicle()
     truth, stated = (
-        principal(vehicle, run(fine, engine).detail).channels,
-        principal(vehicle, stated_result.detail).channels,
+        principal_series(vehicle, run(fine, engine).detail).channels,
+        principal_series(vehicle, stated_result.detail).channels,
     )
-    return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER]) ** 2))) for name in names}
+    return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER_STEPS]) ** 2))) for name in names}
 
 
 @contextmanager
-def counted() -> Iterator[list[float]]:
+def counted_forces() -> Iterator[list[float]]:
     """Context that counts the force evaluations of every run."""
     calls, march = list[float](), HubModel.marched
 

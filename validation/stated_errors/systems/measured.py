@@ -14,22 +14,22 @@ from models.core.result import Result
 from models.engines.cut_vehicle import ENGINES
 from models.systems.measured.run import run
 from models.systems.measured.scene import build
-from validation.stated_errors.sample import Sample, drawn
-from validation.stated_errors.systems.hub_forces import counted
+from validation.stated_errors.sample import Sample, drawn_samples
+from validation.stated_errors.systems.hub_forces import counted_forces
 
-FINER = 12
+FINER_STEPS = 12
 """Times that the truth's steps are shorter."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random recordings whose runs come to an end."""
-    return drawn(count, seed, _draw_recording)
+    return drawn_samples(count, seed, _draw_recording)
 
 
 def _draw_recording(random: np.random.Generator) -> Sample:
     """Sample from one random recording; raises before the run if the step would be unstable."""
     engine = str(random.choice(ENGINES))
-    return _sample(_table(random), engine)
+    return _sample_of_recording(_table(random), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:
@@ -58,18 +58,20 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _sample(table: dict[str, Any], engine: str) -> Sample:
+def _sample_of_recording(table: dict[str, Any], engine: str) -> Sample:
     """Run a recording with its stated error, and compute its true error."""
     scene = build(table, "drawn.toml")
-    with counted() as calls:
+    with counted_forces() as calls:
         try:
             told = run(scene, engine, error=True)
         except RunFailed as error:
             if error.partial is None:
                 raise
             told = error.partial
-    virtual = table["virtual"] | {"step": table["virtual"]["step"] / FINER}
-    truth = run(build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER * virtual["sampling_rate"])}}), engine)
+    virtual = table["virtual"] | {"step": table["virtual"]["step"] / FINER_STEPS}
+    truth = run(
+        build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER_STEPS * virtual["sampling_rate"])}}), engine
+    )
     steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + told.counts()["steps"])
     title = f"{table['title']}, {table['stabilise']['method']}"
     return Sample(title, engine, errors_of(told), _true_errors(told, truth), steps, sum(calls) - steps)

@@ -22,21 +22,21 @@ from models.engines.catalogue import CATALOGUE, MISSING
 from models.systems.pitch_plane import run as single
 from models.systems.pitch_plane.scene import Scene, build, parameter_set, settings_of
 from models.systems.pitch_plane.virtual_measurement import measure, write_measurement
-from validation.stated_errors.sample import Sample, drawn
+from validation.stated_errors.sample import Sample, drawn_samples
 
-FINER, FINEST = 100, 2e-6
+FINER_STEPS, FINEST_STEP = 100, 2e-6
 """Ratio of the run's step to the truth's, and the shortest step (s) of a truth, which that of adaptive methods has."""
-PERIODS = (1e-3, 2e-3, 5e-3)
+SAMPLING_PERIODS = (1e-3, 2e-3, 5e-3)
 """Sampling periods (s) of wheel forces and pitch."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random runs; scenes that an engine refuses are replaced by others."""
     with TemporaryDirectory() as folder:
-        yield from drawn(count, [seed, 1], lambda random: _sample(random, Path(folder)))
+        yield from drawn_samples(count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
 
 
-def _sample(random: np.random.Generator, folder: Path) -> Sample:
+def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     """Sample from one random run; raises for an unstable step, and for an interpolation that the method cannot use."""
     engine = str(random.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
@@ -66,7 +66,7 @@ def _reference_run(scene: Scene, engine: str) -> Result:
     """The reference's run with steps that divide the scene's."""
     settings = settings_of(scene, engine)
     step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
-    finer = max(1, round(step / FINEST if adaptive else min(FINER, step / FINEST)))
+    finer = max(1, round(step / FINEST_STEP if adaptive else min(FINER_STEPS, step / FINEST_STEP)))
     return single.run(scene, "reference", Settings("RK4", step / finer, scene.run.duration))
 
 
@@ -155,7 +155,7 @@ def _road(rng: np.random.Generator, folder: Path) -> dict[str, Any]:
 
 def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
     """Random wheel forces from a virtual measurement, sometimes with noise, sometimes with a prescribed pitch."""
-    period, duration = float(rng.choice(PERIODS)), table["run"]["duration"]
+    period, duration = float(rng.choice(SAMPLING_PERIODS)), table["run"]["duration"]
     road = {"source": "study", "speed": float(rng.uniform(8.0, 25.0))}
     on_road = build(
         {

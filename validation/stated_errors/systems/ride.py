@@ -12,24 +12,24 @@ from control import lyap
 from models.core.discretisation import Estimate, errors_of
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.ride.covariance import hits
-from models.ride.excited import excited
+from models.ride.covariance import noise_arrivals
+from models.ride.excited import vehicle_with_road
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.nonlinear import ORDER, Sampling, in_engine, linearised, ride_over
+from models.systems.ride.nonlinear import RUNGE_KUTTA_ORDER, Sampling, in_engine, linearised_result, ride_over
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
-from models.systems.ride.run import ANY, run
+from models.systems.ride.run import ANY_SPEED, run
 from models.systems.ride.scene import RideScene, build
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from validation.stated_errors.sample import Sample
 
-FINER = 100
+FINER_STEPS = 100
 """Times that a truth's steps are shorter."""
-MANY = 2000
+TRUTH_COPIES = 2000
 """Copies of a truth."""
 ENGINES = ("exudyn", "mujoco")
 
@@ -37,7 +37,7 @@ ENGINES = ("exudyn", "mujoco")
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random rides of all kinds in turn."""
     rng = np.random.default_rng(seed)
-    kinds = (_in_time, _sample_of_sweep, _in_time, _driven, _in_time, _copies)
+    kinds = (_sample_in_time, _sample_of_sweep, _sample_in_time, _sample_of_drive, _sample_in_time, _sample_of_copies)
     for i in range(count):
         yield kinds[i % len(kinds)](rng, i)
 
@@ -54,7 +54,7 @@ def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **table
     return build({"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **tables}, "sample.toml")
 
 
-def _varied(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
+def _varied_vehicle(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with random changes of stiffnesses and dampings."""
     springs = tuple(
         replace(s, stiffness=s.stiffness * rng.uniform(0.6, 1.6), damping=s.damping * rng.uniform(0.5, 1.8))
@@ -74,10 +74,10 @@ def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
     file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
     engine = str(rng.choice(["reference", *ENGINES]))
     scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
-    vehicle = _varied(rng, vehicle_of(scene))
+    vehicle = _varied_vehicle(rng, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, deviation = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
-    true = np.array([exact(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
+    true = np.array([exact_deviations(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
     gaps = np.sqrt(np.mean((deviation - true) ** 2, axis=0))
     names = result["output"].tolist()
     return _sample_of(
@@ -85,9 +85,9 @@ def _sample_of_sweep(rng: np.random.Generator, number: int) -> Sample:
     )
 
 
-def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+def exact_deviations(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
     """Standard deviations (p,) of a vehicle with undamped tyres in extended precision, from its matrices."""
-    system, n, m = excited(linear, road, speed), len(linear.mass), len(road.F)
+    system, n, m = vehicle_with_road(linear, road, speed), len(linear.mass), len(road.F)
     A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
     forces = np.hstack([linear.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
     wanted = np.hstack([-linear.stiffness, -linear.damping, forces])
@@ -98,7 +98,7 @@ def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
         len(road.heights) * m, -1
     )
     C += linear.read.acceleration_factors @ (A - system.A)[n : 2 * n]
-    met = hits(system)
+    met = noise_arrivals(system)
     before, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
     for j, b in enumerate(met.B):
         if j and not met.independent:
@@ -125,18 +125,18 @@ def _exponential(A: np.ndarray) -> np.ndarray:
     return total
 
 
-def _driven(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_drive(rng: np.random.Generator, number: int) -> Sample:
     """Sample from a drive with two sections, whose truth has steps eight times shorter (error about 1e-9 of the step's
     own)."""
     first = float(rng.choice([0.0, rng.uniform(2.0, 15.0)]))
     drive = {"time": [0.0, float(rng.uniform(1.0, 2.0)), 3.0], "speed": [first, *rng.uniform(3.0, 30.0, 2).tolist()]}
     scene = _scene(rng, "quarter_car", drive=drive, study="ride_drive")
-    vehicle = _varied(rng, vehicle_of(scene))
+    vehicle = _varied_vehicle(rng, vehicle_of(scene))
     engine = str(rng.choice(["reference", *ENGINES]))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
     fine = varying_speed(
-        linear_vehicle(vehicle)(ANY), road, profile, instants=result.times, reach=LARGEST_RATE_TIMES_STEP / 8.0
+        linear_vehicle(vehicle)(ANY_SPEED), road, profile, instants=result.times, reach=LARGEST_RATE_TIMES_STEP / 8.0
     )
     rows = np.abs(fine.time[:, None] - result.times).argmin(axis=0)
     gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
@@ -145,15 +145,15 @@ def _driven(rng: np.random.Generator, number: int) -> Sample:
     return _sample_of(result, f"{number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps)
 
 
-def _copies(rng: np.random.Generator, number: int) -> Sample:
+def _sample_of_copies(rng: np.random.Generator, number: int) -> Sample:
     """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the truth has many more
     copies and shorter steps. Both contain random scatter."""
     speed = float(rng.uniform(5.0, 35.0))
     scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=number)
-    result = linearised(scene, vehicle, sampling, lambda text, share: None, error=True)
+    result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
-    fine = copies_in_time(vehicle, road, speed, 10.0, copies=MANY, seed=1000 + number, longest=run.step / 4.0)
+    fine = copies_in_time(vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + number, longest=run.step / 4.0)
     chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
     told, true = dict[str, Estimate](), dict[str, float]()
     for i, (name, gains) in enumerate(zip(run.names, result["deviation"][0], strict=True)):
@@ -168,7 +168,7 @@ def _copies(rng: np.random.Generator, number: int) -> Sample:
     return Sample(f"{number}: bent quarter car at {speed:.3g} m/s", "reference", told, true, steps, 0.375 * steps)
 
 
-def _in_time(rng: np.random.Generator, number: int) -> Sample:
+def _sample_in_time(rng: np.random.Generator, number: int) -> Sample:
     """Sample from a run in time with nonlinear springs or tyres that lift, whose truth has much shorter steps on the
     same road."""
     bent, speed = rng.random() < 0.5, float(rng.uniform(5.0, 40.0))
@@ -176,33 +176,33 @@ def _in_time(rng: np.random.Generator, number: int) -> Sample:
     tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
     tables |= {} if bent else {"effects": {"lift_off": {}}}
     scene = _scene(rng, file, "loaded", **tables)
-    vehicle, engine = _varied(rng, vehicle_of(scene)), str(rng.choice(ENGINES))
+    vehicle, engine = _varied_vehicle(rng, vehicle_of(scene)), str(rng.choice(ENGINES))
     sampling = Sampling(step=float(10 ** rng.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=number)
     road = excitation_of(scene, wheels(vehicle))
     path = _path(scene, engine, vehicle, sampling, road, speed)
-    steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER)
-    table = finer.table(steps * FINER, number)
+    steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)
+    table = finer.table(steps * FINER_STEPS, number)
     try:
-        result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER].copy())
+        result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER_STEPS].copy())
     except RunFailed as failure:
         result = failure.partial
-    rows = result.detail.rows * FINER
+    rows = result.detail.rows * FINER_STEPS
     every, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
     fine = ride_over("mujoco", vehicle, finer, table, skipped=begin, every=every)
     gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
     true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
-    calls = ORDER * steps + len(rows)
+    calls = RUNGE_KUTTA_ORDER * steps + len(rows)
     read = (1.0 + 0.9 + 0.18) * steps / 16
     name = f"{number}: {file} at {speed:.3g} m/s in steps of {1e3 * path.step:.2g} ms"
-    return _sample_of(result, name, engine, true, calls, 0.54 * ORDER * steps + read)
+    return _sample_of(result, name, engine, true, calls, 0.54 * RUNGE_KUTTA_ORDER * steps + read)
 
 
 def _path(
     scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
 ) -> RoadPath:
     """The road path with the step that ``in_engine`` uses."""
-    from models.ride.nonlinear_copies import followed
+    from models.ride.nonlinear_copies import longest_resolving_step
     from models.ride.road_path import road_path
-    from models.systems.ride.nonlinear import STEP
+    from models.systems.ride.nonlinear import LONGEST_STEP
 
-    return road_path(road, speed, min(sampling.step or STEP, followed(vehicle, speed)))
+    return road_path(road, speed, min(sampling.step or LONGEST_STEP, longest_resolving_step(vehicle, speed)))

@@ -10,17 +10,17 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.systems.contact.stated_error import rms
-from models.systems.wheel_rail.run import EVERY, SUMS, run, sums
+from models.systems.contact.stated_error import finite_rms
+from models.systems.wheel_rail.run import POSITIONS_PER_ERROR, WHEEL_QUANTITIES, run, wheel_sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
-from validation.stated_errors.sample import Sample, drawn
+from validation.stated_errors.sample import Sample, drawn_samples
 
-FINER, POSITIONS = 4.0, 4
+FINER_CELLS, POSITION_COUNT = 4.0, 4
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn(count, seed, lambda random: _sample(_draw_scene(random)))
+    return drawn_samples(count, seed, lambda random: _sample_of_position(_draw_scene(random)))
 
 
 def _draw_scene(rng: np.random.Generator) -> WheelRailScene:
@@ -33,23 +33,29 @@ def _draw_scene(rng: np.random.Generator) -> WheelRailScene:
             "system": "wheel-rail",
             "wheelset": {"load": float(10.0 ** rng.uniform(3.7, 5.0)), "radius": float(rng.uniform(0.35, 0.6))},
             "profiles": {"inclination": float(rng.choice([0.025, 0.05]))},
-            "positions": {"start": start, "stop": start + 0.004, "count": POSITIONS},
+            "positions": {"start": start, "stop": start + 0.004, "count": POSITION_COUNT},
             "method": {"cells": int(rng.integers(10, 24))},
             "cases": {"one": case},
         }
     )
 
 
-def _sample(scene: WheelRailScene) -> Sample | None:
+def _sample_of_position(scene: WheelRailScene) -> Sample | None:
     made = run(scene, error=True)
     told, case = errors_of(made), next(iter(scene.cases.values()))
     held = scene.contact(case)
-    fine = replace(held, coarser=held.coarser / FINER)
+    fine = replace(held, cell_factor=held.cell_factor / FINER_CELLS)
     placed = made.detail.placed
     gaps = np.array(
-        [sums(wheelset_place) - sums(fine.at(wheelset_place.shift, wheelset_place.yaw)) for wheelset_place in placed]
+        [
+            wheel_sums(wheelset_place) - wheel_sums(fine.at(wheelset_place.shift, wheelset_place.yaw))
+            for wheelset_place in placed
+        ]
     )
-    true = {name: rms(gaps[:, :, k]) for k, name in enumerate(SUMS)}
-    calls, again = len(placed) * scene.method.cells**2, len(placed[::EVERY]) * (scene.method.cells / 2.0) ** 2
+    true = {name: finite_rms(gaps[:, :, k]) for k, name in enumerate(WHEEL_QUANTITIES)}
+    calls, again = (
+        len(placed) * scene.method.cells**2,
+        len(placed[::POSITIONS_PER_ERROR]) * (scene.method.cells / 2.0) ** 2,
+    )
     name = f"{scene.wheelset.load:.3g} N, {scene.method.cells} cells, {'rolling' if case.friction else 'pressed'}"
     return Sample(name, "", told, {channel: true[channel] for channel in told}, calls, again) if told else None

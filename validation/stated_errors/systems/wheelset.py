@@ -17,19 +17,19 @@ from models.rail.equations import WheelsetPath
 from models.systems.wheelset import run as system
 from models.systems.wheelset.of_scene import equations_of
 from models.systems.wheelset.scene import WheelsetScene, build
-from models.systems.wheelset.stated_error import changed, series
-from validation.stated_errors.sample import Sample, drawn
+from models.systems.wheelset.stated_error import principal_series, with_step_factor
+from validation.stated_errors.sample import Sample, drawn_samples
 
 ENGINES = ("reference", "exudyn", "mujoco")
-FINER, MORE, MOST = 8.0, 10, 200
+FINER_STEPS, FINER_CELLS, MOST_CELLS = 8.0, 10, 200
 """Steps and cells of the truths divided by those of the run; cells at most."""
-LONGEST = 2.4
+LONGEST_STEP_FACTOR = 2.4
 """Steps by the fastest motion's rate, at most."""
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` samples from random scenes; scenes that fail or are refused are replaced by others."""
-    return drawn(count, seed, lambda random: _sample(*_draw_scene(random)))
+    return drawn_samples(count, seed, lambda random: _sample_of_path(*_draw_scene(random)))
 
 
 def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
@@ -54,17 +54,17 @@ def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
     equations = equations_of(build(table), "reference", speed)
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
     duration = float(rng.uniform(0.3, 2.0))
-    steps = math.ceil(duration * fastest / (LONGEST * rng.uniform(0.1, 1.0)))
+    steps = math.ceil(duration * fastest / (LONGEST_STEP_FACTOR * rng.uniform(0.1, 1.0)))
     table["run"] |= {"step": duration / steps, "duration": duration}
     return build(table), str(rng.choice(ENGINES)), speed
 
 
-def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample:
+def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
     marched, march = list[float](), system.path
 
     def counted(other_scene: WheelsetScene, engine: str, speed: float) -> WheelsetPath:
         path = march(other_scene, engine, speed)
-        marched.append((len(path.times) - 1) * _cells(other_scene))
+        marched.append((len(path.times) - 1) * _count_of_cells(other_scene))
         return path
 
     with mock.patch.object(system, "path", counted):
@@ -77,7 +77,7 @@ def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample:
     return Sample(name, engine, told, true, 4.0 * marched[0], 4.0 * sum(marched[1:]))
 
 
-def _cells(scene: WheelsetScene) -> float:
+def _count_of_cells(scene: WheelsetScene) -> float:
     return scene.contact.cells**2 if scene.contact.law == "fastsim" else 1.0
 
 
@@ -85,12 +85,12 @@ def _true_errors(
     scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], WheelsetPath]
 ) -> Mapping[str, float]:
     """True errors by steps and by cells, for the channels of the estimates."""
-    fine = series(run.detail)
-    true = _rms_differences(fine, series(march(changed(scene, 1.0 / FINER))))
+    fine = principal_series(run.detail)
+    true = _rms_differences(fine, principal_series(march(with_step_factor(scene, 1.0 / FINER_STEPS))))
     if scene.contact.law == "linear":
         return true
-    cells = min(MORE * scene.contact.cells, MOST)
-    of_cells = _rms_differences(fine, series(march(changed(scene, 1.0, cells=cells))))
+    cells = min(FINER_CELLS * scene.contact.cells, MOST_CELLS)
+    of_cells = _rms_differences(fine, principal_series(march(with_step_factor(scene, 1.0, cells=cells))))
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 

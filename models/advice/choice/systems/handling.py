@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from models.advice.choice.answer import Quantity, RunQuantities
-from models.systems.handling.run import REPORTS, run
+from models.systems.handling.run import TYRE_CHANNELS, run
 from models.systems.handling.scene import HandlingScene
 
 ENGINE, WINDOWED = "mujoco", True
-MOTION = {"speed": (0, "m/s"), "side speed": (1, "m/s"), "yaw rate": (2, "rad/s")}
-TYRES = ("load", "fx", "fy", "mz")
+MOTION_CHANNELS = {"speed": (0, "m/s"), "side speed": (1, "m/s"), "yaw rate": (2, "rad/s")}
+TYRE_QUANTITIES = ("load", "fx", "fy", "mz")
 """Of every tyre, a case each."""
 
 
@@ -19,11 +19,13 @@ def computed_quantities(scene: HandlingScene, engine: str, error: bool = False) 
     runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [each.detail for each in runs]
     speeds = [drive.velocity() for drive in drives]
-    quantities = {name: Quantity(unit, tuple(speed[:, i] for speed in speeds)) for name, (i, unit) in MOTION.items()}
+    quantities = {
+        name: Quantity(unit, tuple(speed[:, i] for speed in speeds)) for name, (i, unit) in MOTION_CHANNELS.items()
+    }
     quantities["lateral acceleration"] = Quantity("m/s^2", tuple(drive.lateral_acceleration() for drive in drives))
-    for name in TYRES:
+    for name in TYRE_QUANTITIES:
         columns = tuple(np.ascontiguousarray(column) for drive in drives for column in drive[name].T)
-        quantities[name] = Quantity(REPORTS[name][1], columns)
+        quantities[name] = Quantity(TYRE_CHANNELS[name][1], columns)
     steps, handling = sum(each.counts()["steps"] for each in runs), drives[-1].handling
     counts = {
         "steps": steps,

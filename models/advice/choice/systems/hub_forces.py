@@ -3,7 +3,7 @@
 from typing import Any
 
 from models.advice.choice.answer import Quantity, RunQuantities
-from models.systems.hub_forces.run import MOTION, run
+from models.systems.hub_forces.run import MOTION_CHANNELS, run
 from models.systems.hub_forces.scene import HubScene
 
 ENGINE, WINDOWED = "mujoco", True
@@ -12,7 +12,7 @@ ENGINE, WINDOWED = "mujoco", True
 def computed_quantities(scene: HubScene, engine: str, error: bool = False) -> RunQuantities:
     """Measure hub forces, run the vehicle with roll and pitch held as in the scene, and collect the quantities."""
     path = run(scene, engine, error=error)
-    quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION.items()}
+    quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION_CHANNELS.items()}
     names = path.data["element"].values
     quantities |= {str(name): Quantity("N", (path["section_force"][:, i],)) for i, name in enumerate(names)}
     counts = path.counts()

@@ -8,12 +8,12 @@ from typing import Any
 
 from models.advice.choice.answer import Quantity, RunQuantities
 from models.core.errors import InputError
-from models.systems.measured.clock import LEAST
+from models.systems.measured.clock import FEWEST_SAMPLES
 from models.systems.measured.run import Examination, read_files, run
 from models.systems.measured.scene import MeasuredScene
 
 ENGINE, WINDOWED = "mujoco", True
-FINE = 60
+SHORTEST_PART_STEPS = 60
 """Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
 
 
@@ -36,7 +36,7 @@ def computed_quantities(scene: MeasuredScene, engine: str, error: bool = False) 
 
 def steps(scene: MeasuredScene) -> int:
     """Number of steps of a run."""
-    return round(_clock(scene)[1] / _step(scene))
+    return round(_period_and_duration(scene)[1] / _step(scene))
 
 
 parts = steps
@@ -44,10 +44,10 @@ parts = steps
 
 def _step(scene: MeasuredScene) -> float:
     """Step of the run (s): the scene's, else the period of the recording."""
-    return scene.run.step or _clock(scene)[0]
+    return scene.run.step or _period_and_duration(scene)[0]
 
 
-def _clock(scene: MeasuredScene) -> tuple[float, float]:
+def _period_and_duration(scene: MeasuredScene) -> tuple[float, float]:
     """Sampling period and duration (s) of the recording. For a virtual measurement they are known without a run."""
     if scene.virtual is not None:
         whole = scene.virtual.duration - scene.clock.start
@@ -61,8 +61,8 @@ def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
     """Shorten the run to ``few`` steps, at least as many as a recording must have; a virtual measurement ends then,
     too.
     """
-    period, whole = _clock(scene)
-    least = FINE * math.ceil(LEAST * period / (_step(scene) * FINE))
+    period, whole = _period_and_duration(scene)
+    least = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))
     duration = min(max(few, least) * _step(scene), whole)
     if scene.virtual is None:
         table.setdefault("clock", {})["duration"] = duration

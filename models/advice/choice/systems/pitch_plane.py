@@ -5,22 +5,22 @@ from typing import Any
 
 from models.advice.choice.answer import Quantity, RunQuantities
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
 ENGINE, WINDOWED = "reference", True
-CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
+CALLS_PER_STEP = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Calls of a step of methods that do not count them."""
 
 
 def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQuantities:
     """Run the scene and collect its quantities."""
-    assembly = assemble(scene)
+    assembly = assembly_of_scene(scene)
     begun = time.process_time()
     result = run(scene, engine, assembly=assembly, error=error)
     seconds = time.process_time() - begun
     told, states = result.counts(), result.detail.states
     counts = {"steps": told.get("steps", len(states) - 1), "states": states.shape[1]}
-    counts["calls"] = told.get("force calls", CALLS.get(result.data.attrs["integrator"], 1) * counts["steps"])
+    counts["calls"] = told.get("force calls", CALLS_PER_STEP.get(result.data.attrs["integrator"], 1) * counts["steps"])
     quantities = {
         str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in result.data.data_vars.items()
     }

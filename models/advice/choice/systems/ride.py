@@ -6,7 +6,7 @@ from math import gcd
 import numpy as np
 
 from models.advice.choice.answer import Quantity, RunQuantities
-from models.advice.ride_choice.in_time import UNIT, CopiesInTime, in_time
+from models.advice.ride_choice.in_time import STEP_MULTIPLE, CopiesInTime, in_time
 from models.core.errors import InputError
 from models.engines.spatial_protocol import curves
 from models.systems.ride.of_scene import scene_errors
@@ -33,14 +33,14 @@ def computed_quantities(scene: CopiesInTime, engine: str, error: bool = False) -
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
     squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
-    for pace in scene.paces:
+    for pace in scene.steps_at_speeds:
         roads, begun = scene.roads(pace), time.process_time()
-        outputs, squares = scene.squares(pace, roads)
+        outputs, squares = scene.mean_squares(pace, roads)
         seconds += time.process_time() - begun
         for output, of_copies in zip(outputs, squares.T, strict=True):
             squares_of.setdefault(output.name, []).append(of_copies)
     units = {output.name: output.unit for output in outputs}
-    vehicle = scene.vehicle(scene.paces[0])
+    vehicle = scene.vehicle(scene.steps_at_speeds[0])
     counts = {
         "steps": scene.steps,
         "calls": 4 * scene.steps,
@@ -58,4 +58,4 @@ def steps(scene: CopiesInTime) -> int:
 
 def parts(scene: CopiesInTime) -> int:
     """Number by which the steps of a run can be grouped in whole numbers, both before and while outputs count."""
-    return UNIT // gcd(UNIT, scene.times)
+    return STEP_MULTIPLE // gcd(STEP_MULTIPLE, scene.times)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.choice.answer import Quantity, RunQuantities
-from models.rail.equations import STATES
+from models.rail.equations import STATE_COUNT
 from models.systems.wheelset.of_scene import path_speeds
 from models.systems.wheelset.run import run
 from models.systems.wheelset.scene import WheelsetScene
@@ -28,7 +28,7 @@ def computed_quantities(scene: WheelsetScene, engine: str, error: bool = False) 
     cells = 2 * scene.contact.cells**2 if scene.contact.law == "fastsim" else 0  # of FASTSIM's nets under both wheels
     return RunQuantities(
         quantities,
-        {"steps": counts["steps"], "calls": counts["force calls"], "states": STATES, "terms": cells},
+        {"steps": counts["steps"], "calls": counts["force calls"], "states": STATE_COUNT, "terms": cells},
         sum(path.seconds for path in paths),
     )
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import PricedRun, SettingLadder
-from models.advice.price.meshed import chosen, run_and_quantity
+from models.advice.price.meshed import checked_quantity, run_and_quantity
 from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
 from models.systems.braking.march import BrakingPath
@@ -15,12 +15,12 @@ from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
-METHOD = "exact wheel"
-SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+METHOD_NAME = "exact wheel"
+SUBSTEPS_TRIED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """Steps within a sample that are tried, and those of the scene."""
-ROUGH, DOUBLED = 8, 8
+FIRST_REFERENCE_SUBSTEPS, REFERENCE_RUNGS = 8, 8
 """Substeps of the reference's first rung, and how many rungs there are."""
-USUAL = "stopping_distance"
+USUAL_QUANTITY = "stopping_distance"
 QUANTITIES: dict[str, tuple[Any, str]] = {
     "stopping_distance": (lambda path: Stop(path).way[-1], "m"),
     "stopping_time": (lambda path: path.times[-1], "s"),
@@ -66,13 +66,20 @@ class PricedBraking:
     def ladders(self) -> list[SettingLadder]:
         """Ladder of steps for the only method of braking, one for each engine that carries the chassis."""
         run = self.scene.run
-        values = tuple(run.sample / n for n in sorted({*SUBSTEPS, run.substeps}))
-        return [SettingLadder(engine, METHOD, values, 1, default=run.sample / run.substeps) for engine in self.engines]
+        values = tuple(run.sample / n for n in sorted({*SUBSTEPS_TRIED, run.substeps}))
+        return [
+            SettingLadder(engine, METHOD_NAME, values, 1, default=run.sample / run.substeps) for engine in self.engines
+        ]
 
     def reference(self) -> SettingLadder:
         """Ladder of the reference, with twice as many steps on every rung."""
         engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
-        return SettingLadder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
+        return SettingLadder(
+            engine,
+            METHOD_NAME,
+            tuple(self.scene.run.sample / (FIRST_REFERENCE_SUBSTEPS * 2**k) for k in range(REFERENCE_RUNGS)),
+            1,
+        )
 
     def second(self, reference_setting: Setting) -> Setting | None:
         """None: there is only one method for a stop with valves in the loop."""
@@ -85,7 +92,7 @@ class PricedBraking:
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
         path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.name).detail
-        if not path.stands:
+        if not path.ended_at_rest:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path
 
@@ -113,8 +120,8 @@ def priced_scene(scene: BrakingScene, quantity: str | None, engines: tuple[str, 
             None,
             "cannot be priced: what stands behind it answers one run; leave it out, with a controller in its place",
         )
-    name, asked = run_and_quantity(quantity, USUAL, scene.procedures, "procedure")
-    chosen(asked, QUANTITIES)
+    name, asked = run_and_quantity(quantity, USUAL_QUANTITY, scene.procedures, "procedure")
+    checked_quantity(asked, QUANTITIES)
     others = [procedure for procedure in scene.procedures if procedure != name]
     note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
     return PricedBraking(scene, name, asked, engines_of(scene, engines), note)

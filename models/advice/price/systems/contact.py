@@ -12,21 +12,21 @@ import numpy as np
 from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
-from models.core.tables import RowBlock, blocks
-from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES, COLUMNS, solved_rows
+from models.core.tables import RowBlock, table_blocks
+from models.systems.contact.cases_table import ANSWER_COLUMNS, BY_AXES, BY_CURVATURES, solved_rows
 from models.systems.contact.run import run, table_contacts
 from models.systems.contact.scene import ContactScene, Method
 
-ROWS = 1000
+PRICED_ROWS = 1000
 """Rows of a table by which it is priced, the first ones."""
-CELLS = (5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 181, 255)
+CELLS_TRIED = (5, 7, 9, 11, 15, 21, 31, 45, 63, 91, 127, 181, 255)
 """Cells along each axis that are tried, and those of the scene."""
-REFERENCE = (25, 50, 100, 200, 400)
+REFERENCE_CELLS = (25, 50, 100, 200, 400)
 """Cells of the reference's rungs."""
-MARCHES = {"fastsim": ("second-order", "plain"), "simplified": ("",)}
+MARCHES_OF_THEORY = {"fastsim": ("second-order", "plain"), "simplified": ("",)}
 """Theories whose cells can be chosen, with the marches of each."""
-UNITS = {"fx": "N", "fy": "N", "mz": "N m"}
-USUAL = "fx,fy"
+UNIT_OF_CHANNEL = {"fx": "N", "fy": "N", "mz": "N m"}
+USUAL_QUANTITY = "fx,fy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class PricedContact:
     @property
     def unit(self) -> str:
         """Unit that all channels share."""
-        return UNITS[self.channels[0]]
+        return UNIT_OF_CHANNEL[self.channels[0]]
 
     @property
     def extent(self) -> str:
@@ -70,10 +70,10 @@ class PricedContact:
     def ladders(self) -> list[SettingLadder]:
         """Ladder of cells for every march of the scene's theory."""
         name, usual = self.scene.method.name, self.scene.method
-        values = tuple(1.0 / n for n in sorted({*CELLS, usual.cells}))
+        values = tuple(1.0 / n for n in sorted({*CELLS_TRIED, usual.cells}))
         return [
             SettingLadder(name, march or name, values, self._order(march), default=self._default(march), cells=True)
-            for march in MARCHES[name]
+            for march in MARCHES_OF_THEORY[name]
         ]
 
     def _default(self, march: str) -> float:
@@ -85,8 +85,8 @@ class PricedContact:
     def reference(self) -> SettingLadder:
         """Ladder of the reference: cells that halve, with the march of the highest order."""
         name = self.scene.method.name
-        march = MARCHES[name][0]
-        values = tuple(1.0 / n for n in REFERENCE)
+        march = MARCHES_OF_THEORY[name][0]
+        values = tuple(1.0 / n for n in REFERENCE_CELLS)
         said = "half the cells change it by"
         return SettingLadder(name, march or name, values, self._order(march), cells=True, said=said)
 
@@ -95,7 +95,7 @@ class PricedContact:
         return None
 
     def _method(self, march: str, cells: int) -> Method:
-        update = {"cells": cells, **({"march": march} if march in MARCHES["fastsim"] else {})}
+        update = {"cells": cells, **({"march": march} if march in MARCHES_OF_THEORY["fastsim"] else {})}
         return self.scene.method.model_copy(update=update)
 
     def solve(self, setting: Setting, duration: float) -> tuple[np.ndarray, int]:
@@ -106,7 +106,7 @@ class PricedContact:
             values = np.column_stack([contact[name] for name in self.channels])
         else:
             answered = solved_rows(self.rows, partial(table_contacts, self.scene), method, False)["forces"]
-            values = answered[:, [COLUMNS.index(name) for name in self.channels]]
+            values = answered[:, [ANSWER_COLUMNS.index(name) for name in self.channels]]
         return values, len(values) * method.cells**2
 
     def answer(self, solution: tuple[np.ndarray, int]) -> PricedRun:
@@ -117,33 +117,33 @@ class PricedContact:
 
     def lines(self, setting: Setting) -> list[str]:
         """Lines of a scene that set the number of cells and the march."""
-        march = [f'march = "{setting.method}"'] if setting.method in MARCHES["fastsim"] else []
+        march = [f'march = "{setting.method}"'] if setting.method in MARCHES_OF_THEORY["fastsim"] else []
         return ["[method]", f"cells = {round(1.0 / setting.value)}", *march]
 
 
 def priced_scene(scene: ContactScene, quantity: str | None, engines: tuple[str, ...]) -> PricedContact:
     """The contact scene with a quantity to price: forces fx, fy in the plane of the contact, or the moment mz."""
-    channels = tuple(name.strip() for name in (quantity or USUAL).split(","))
+    channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY).split(","))
     for name in channels:
-        if name not in UNITS:
-            raise InputError("--quantity", "", name, "is nothing that cells change", tuple(UNITS))
-    if len({UNITS[name] for name in channels}) > 1:
+        if name not in UNIT_OF_CHANNEL:
+            raise InputError("--quantity", "", name, "is nothing that cells change", tuple(UNIT_OF_CHANNEL))
+    if len({UNIT_OF_CHANNEL[name] for name in channels}) > 1:
         allowed = "has forces and a moment, of two units: one tolerance cannot hold for both"
         raise InputError("--quantity", "", ",".join(channels), allowed)
-    if scene.method.name not in MARCHES:
+    if scene.method.name not in MARCHES_OF_THEORY:
         allowed = "has no cells that could be chosen by their price; the study contact_price compares all theories"
-        raise InputError(scene.file, "method.name", scene.method.name, allowed, tuple(MARCHES))
+        raise InputError(scene.file, "method.name", scene.method.name, allowed, tuple(MARCHES_OF_THEORY))
     return PricedContact(scene, channels, None if scene.cases is None else _sound_rows(scene))
 
 
 def _sound_rows(scene: ContactScene) -> RowBlock:
     """The first rows of a table, without those that the theory refuses; InputError where none remain."""
     file = scene.cases_file()
-    for block in islice(blocks(file, (BY_AXES, BY_CURVATURES), ROWS), 1):
-        coarse = scene.method.model_copy(update={"cells": CELLS[0]})
+    for block in islice(table_blocks(file, (BY_AXES, BY_CURVATURES), PRICED_ROWS), 1):
+        coarse = scene.method.model_copy(update={"cells": CELLS_TRIED[0]})
         wrong = solved_rows(block, partial(table_contacts, scene), coarse, False)["wrong"]
         sound = np.setdiff1d(np.arange(len(block.lines)), wrong)
         if len(sound):
             columns = {name: column[sound] for name, column in block.values.items()}
             return RowBlock([block.lines[i] for i in sound], columns, {})
-    raise InputError(file, "", None, f"has no sound row among its first {ROWS:,}")
+    raise InputError(file, "", None, f"has no sound row among its first {PRICED_ROWS:,}")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, chosen, first_part, run_and_quantity
+from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, checked_quantity, first_part, run_and_quantity
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
@@ -15,9 +15,9 @@ from models.multibody.numbers import Handling
 from models.systems.handling.run import Drive, build, drive_run, judged_drive, read_run
 from models.systems.handling.scene import HandlingScene
 
-FIRST = 1.0
+SEARCHED_DURATION = 1.0
 """s: of a longer manoeuvre only so much is searched."""
-USUAL = "yaw_rate"
+USUAL_QUANTITY = "yaw_rate"
 QUANTITIES: dict[str, tuple[Any, str]] = {
     "yaw_rate": (lambda drive: drive.velocity()[:, 2], "rad/s"),
     "lateral_acceleration": (lambda drive: drive.lateral_acceleration(), "m/s^2"),
@@ -84,8 +84,8 @@ class PricedHandling(MeshedScene):
 
 def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> PricedHandling:
     """The handling scene with the quantity MANOEUVRE.QUANTITY to price; the first manoeuvre where none is named."""
-    name, asked = run_and_quantity(quantity, USUAL, scene.manoeuvres, "manoeuvre")
-    chosen(asked, QUANTITIES)
+    name, asked = run_and_quantity(quantity, USUAL_QUANTITY, scene.manoeuvres, "manoeuvre")
+    checked_quantity(asked, QUANTITIES)
     manoeuvre, step, others = (
         scene.manoeuvres[name],
         scene.run.step,
@@ -98,7 +98,7 @@ def priced_scene(scene: HandlingScene, quantity: str | None, engines: tuple[str,
         QUANTITIES[asked][1],
         note,
         manoeuvre.duration,
-        first_part(manoeuvre.duration, FIRST),
+        first_part(manoeuvre.duration, SEARCHED_DURATION),
         engines,
         "mujoco",
         step,

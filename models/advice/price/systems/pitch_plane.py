@@ -13,25 +13,25 @@ from models.core.steps import divides
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 
 ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
 """Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
-RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
+SPECTRAL_RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
 """Spectral radii of the generalised-alpha method that are tried."""
 
-FIRST = 2.0
+SEARCHED_DURATION = 2.0
 """s: of a longer run only so much is searched; what is recommended is then confirmed over all of it."""
-STEPS = tuple(
+STEPS_TRIED = tuple(
     mantissa * 10.0**power
     for power in (-2, -3, -4, -5, -6)
     for mantissa in (10.0, 8.0, 6.25, 5.0, 4.0, 3.2, 2.5, 2.0, 1.6, 1.25)
 )[5:]
 """Steps that are tried (s), each as the nearest one below that divides the run."""
-TOLERANCES = tuple(10.0**-k for k in range(2, 13))
-DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
+TOLERANCES_TRIED = tuple(10.0**-k for k in range(2, 13))
+DEFAULT_OF_METHOD = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
 """What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
-USUAL = {
+USUAL_QUANTITY = {
     "free": "f1,f2",
     "road": "f1,f2",
     "force": "pitch",
@@ -40,9 +40,9 @@ USUAL = {
     "heave-pitch": "enforced_force",
 }
 """The quantity that is asked about where the user names none, by what drives the vehicle."""
-SPACING = 1e-3
+ROW_SPACING = 1e-3
 """s: of the rows of an adaptive method from outside the tree."""
-TIGHT = 1e-10
+SECOND_SOLVER_TOLERANCE = 1e-10
 """Relative tolerance of the second solver, a multistep method beside the reference's Runge-Kutta."""
 
 
@@ -105,11 +105,11 @@ class PricedPitchPlane:
                 adaptive = known.adaptive or getattr(OUTSIDE.get(engine), "adaptive", False)
                 if known.adaptive and self.sampled and (engine, name) not in MISSING:
                     continue
-                for method in [m for m in RADII if m.startswith(name)] or [name]:
-                    values = TOLERANCES if adaptive else self._steps()
+                for method in [m for m in SPECTRAL_RADII if m.startswith(name)] or [name]:
+                    values = TOLERANCES_TRIED if adaptive else self._steps()
                     values = values[:1] if (engine, name) in MISSING else values
                     order = 0 if adaptive else known.order
-                    default = DEFAULTS.get((engine, method), 0.0)
+                    default = DEFAULT_OF_METHOD.get((engine, method), 0.0)
                     ladders.append(SettingLadder(engine, method, values, order, adaptive, default))
         return ladders
 
@@ -120,7 +120,7 @@ class PricedPitchPlane:
 
     def second(self, reference_setting: Setting) -> Setting | None:
         """LSODA, to check the reference; None where it would restart at every sample."""
-        return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
+        return None if self.sampled else Setting("reference", "LSODA", SECOND_SOLVER_TOLERANCE, 0, adaptive=True)
 
     def solve(self, setting: Setting, duration: float) -> Result:
         """The result of a run with a setting, with a row at every step."""
@@ -139,7 +139,7 @@ class PricedPitchPlane:
     def lines(self, setting: Setting) -> list[str]:
         """Lines of a scene file that contain the setting."""
         if setting.engine in OUTSIDE:
-            return _outside(setting)
+            return _outside_engine_lines(setting)
         name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
         last = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
         return [
@@ -153,16 +153,16 @@ class PricedPitchPlane:
         if not setting.adaptive:
             return engine_settings(setting, duration)
         signal = self.assembly.input
-        longest = min(ADAPTIVE_STEP.get(setting.engine, SPACING), signal.resolution if signal is not None else 1.0)
+        longest = min(ADAPTIVE_STEP.get(setting.engine, ROW_SPACING), signal.resolution if signal is not None else 1.0)
         return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
 
     def _steps(self) -> tuple[float, ...]:
         """Steps (s) that are whole fractions of ``base``, from coarse to fine."""
-        parts = np.unique(np.ceil(self.base / np.array(STEPS) * (1 - 1e-9)).astype(int))
+        parts = np.unique(np.ceil(self.base / np.array(STEPS_TRIED) * (1 - 1e-9)).astype(int))
         return tuple(self.base / int(k) for k in parts)
 
 
-def _outside(setting: Setting) -> list[str]:
+def _outside_engine_lines(setting: Setting) -> list[str]:
     """Lines for an engine from outside the tree, which a scene file cannot name."""
     asked = f"# twinrig run SCENE --engine {setting.engine}"
     return (
@@ -174,14 +174,14 @@ def _outside(setting: Setting) -> list[str]:
 
 def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> PricedPitchPlane:
     """The scene with a quantity to price: channels of its result that share a unit, separated by commas."""
-    assembly = assemble(scene)
-    channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))
-    base, first = _lengths(assembly)
+    assembly = assembly_of_scene(scene)
+    channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
+    base, first = _base_step_and_duration(assembly)
     asked = PricedPitchPlane(assembly, engines, channels, "", base, first)
     return replace(asked, unit=_unit(asked))
 
 
-def _lengths(assembly: Assembly) -> tuple[float, float]:
+def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
     """Step (s) whose whole fractions divide the run and its samples, and the duration (s) of the part that is
     searched.
     """
@@ -189,11 +189,11 @@ def _lengths(assembly: Assembly) -> tuple[float, float]:
     sampled = (signal for signal in (assembly.input, assembly.moment) if signal is not None)
     period = next((signal.period for signal in sampled if signal.period is not None), None)
     if period is None:
-        first = length / math.ceil(length / FIRST * (1 - 1e-9))
+        first = length / math.ceil(length / SEARCHED_DURATION * (1 - 1e-9))
         return first, first
     whole = divides(period, length)
     base = period if whole else step * math.gcd(round(length / step), round(period / step))
-    return base, min(length, base * math.ceil(FIRST / base * (1 - 1e-9)))
+    return base, min(length, base * math.ceil(SEARCHED_DURATION / base * (1 - 1e-9)))
 
 
 def _unit(scene: PricedPitchPlane) -> str:
@@ -214,7 +214,7 @@ def _unit(scene: PricedPitchPlane) -> str:
 def engine_settings(setting: Setting, duration: float) -> Settings:
     """The setting in the form that engines use."""
     integrator = setting.method.split()[0]
-    radius = RADII.get(setting.method, 0.6)
+    radius = SPECTRAL_RADII.get(setting.method, 0.6)
     if setting.adaptive:
         return Settings(integrator, ADAPTIVE_STEP[setting.engine], duration, setting.value, radius)
     return Settings(integrator, setting.value, duration, spectral_radius=radius)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, chosen, first_part
+from models.advice.price.meshed import OTHER_TOLERANCE, MeshedScene, checked_quantity, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
@@ -13,9 +13,9 @@ from models.systems.wheelset.of_scene import equations_and_start, path_speeds, w
 from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
 
-FIRST = 0.25
+SEARCHED_DURATION = 0.25
 """s: of a longer path only so much is searched."""
-USUAL = "y"
+USUAL_QUANTITY = "y"
 QUANTITIES = {**STATES, **CONTACTS}
 """Places or fields, and units of what can be asked about: of states, or of the contacts of all patches."""
 
@@ -40,7 +40,7 @@ class PricedWheelset(MeshedScene):
     def exact(self, cells: int, step: float, duration: float) -> list[WheelsetPath]:
         """The path at every speed by the solver DOP853, as an accurate reference."""
         scene = self._scene(cells, step, duration)
-        return [_exact(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
+        return [_exact_path(*equations_and_start(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[WheelsetPath]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity along all paths, as columns over time, and the number of force calls; each path's assumptions
@@ -62,7 +62,7 @@ class PricedWheelset(MeshedScene):
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
-def _exact(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
+def _exact_path(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
     """A path by a Runge-Kutta method of order 8 that picks its own steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start), 1e-3)
@@ -83,7 +83,11 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
 
 def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> PricedWheelset:
     """The wheelset scene with a quantity to price: a state or a contact force, along its paths at all speeds."""
-    asked, wheelset, contact = chosen(quantity or USUAL, QUANTITIES), wheelset_of(scene), scene.contact
+    asked, wheelset, contact = (
+        checked_quantity(quantity or USUAL_QUANTITY, QUANTITIES),
+        wheelset_of(scene),
+        scene.contact,
+    )
     speeds, run = tuple(path_speeds(scene)), scene.run
     fastest = max(
         float(np.abs(np.linalg.eigvals(Equations(wheelset, speed, contact.law).state_matrix)).max()) for speed in speeds
@@ -96,7 +100,7 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
         QUANTITIES[asked][1],
         note,
         run.duration,
-        first_part(run.duration, FIRST),
+        first_part(run.duration, SEARCHED_DURATION),
         engines,
         "reference",
         run.step,

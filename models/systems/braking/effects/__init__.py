@@ -9,12 +9,12 @@ from typing import Any
 from models.core.scene_effects import Entry, Table
 from models.systems.handling.effects import without_trailer
 
-AXLES = ("front", "rear", "trailer")
-NOISE, BITS, SCALE = ("noise",), ("bits", "range"), ("gain", "offset")
+AXLE_KEYS = ("front", "rear", "trailer")
+NOISE_KEYS, CONVERTER_KEYS, SCALE_KEYS = ("noise",), ("bits", "range"), ("gain", "offset")
 """Keys of white noise, of the steps of a converter, and of a sensor that is not set right."""
 
 
-def _differs(table: Any, keys: tuple[str, ...]) -> bool:
+def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
     """Whether any of these keys of a scene's table differs from its default."""
     return any(getattr(table, key) != type(table).model_fields[key].default for key in keys)
 
@@ -25,10 +25,10 @@ def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: st
     """
 
     def there(scene: Any) -> bool:
-        return scene.port is not None and _differs(getattr(scene.port, kind), keys)
+        return scene.port is not None and _differs_from_default(getattr(scene.port, kind), keys)
 
     def leave_out(table: Table, scene: Any) -> None:
-        for key in (*keys, *(("seed",) if keys == NOISE else ())):
+        for key in (*keys, *(("seed",) if keys == NOISE_KEYS else ())):
             table["port"][kind].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
@@ -47,15 +47,15 @@ def _of_brakes(
     """
 
     def there(scene: Any) -> bool:
-        return any(_differs(getattr(scene.brakes, axle), keys) for axle in AXLES)
+        return any(_differs_from_default(getattr(scene.brakes, axle), keys) for axle in AXLE_KEYS)
 
     def leave_out(table: Table, scene: Any) -> None:
-        for axle in {*AXLES} & {*table["brakes"]}:
+        for axle in {*AXLE_KEYS} & {*table["brakes"]}:
             for key in freed:
                 table["brakes"][axle].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
-        for axle in AXLES[:2]:
+        for axle in AXLE_KEYS[:2]:
             plain = getattr(scene.brakes, axle).model_dump(exclude_none=True)
             brake = table.setdefault("brakes", {}).setdefault(axle, plain)
             brake.update(usual(axle, brake))
@@ -120,13 +120,13 @@ def _in_the_plane(table: Table, scene: Any) -> None:
 
 
 def _with_trailer(table: Table, scene: Any) -> None:
-    """Add the trailer ``CHOSEN``, which is unladen."""
-    from models.brake.trailer import CHOSEN
+    """Add the trailer ``CHOSEN_TRAILER``, which is unladen."""
+    from models.brake.trailer import CHOSEN_TRAILER
 
-    table["trailer"] = CHOSEN.model_dump(exclude_unset=True)
+    table["trailer"] = CHOSEN_TRAILER.model_dump(exclude_unset=True)
 
 
-def _tows(scene: Any) -> bool:
+def _tows_bodies(scene: Any) -> bool:
     """Whether the vehicle of the scene's file tows bodies."""
     from models.systems.braking.of_scene import spatial_vehicle_of
 
@@ -134,16 +134,16 @@ def _tows(scene: Any) -> bool:
     return given is not None and bool(given.towed)
 
 
-MEASURED, SUSPENSION = ("measured_pressures",), ("suspension",)
+MEASURED_PRESSURES_KEY, SUSPENSION_KEY = ("measured_pressures",), ("suspension",)
 TABLE = {
     "anti_lock": Entry(
         "A controller that opens and closes the valves of every wheel",
         "controller",
         "one answer of the controller per sample",
         {"controllers": 1},
-        excludes=MEASURED,
+        excludes=MEASURED_PRESSURES_KEY,
         why="which leaves a controller nothing to control",
-        usual={"kind": "slip_bang_bang"},
+        usual_value={"kind": "slip_bang_bang"},
         there=lambda scene: scene.controller.kind != "none",
     ),
     "faults": Entry(
@@ -152,7 +152,7 @@ TABLE = {
         "one look at each fault per sample",
         {"asked": 1},
         ("port",),
-        usual=[{"kind": "lost", "start": 0.1, "end": 0.2}],
+        usual_value=[{"kind": "lost", "start": 0.1, "end": 0.2}],
         there=lambda scene: scene.port is not None and bool(scene.port.faults),
     ),
     "hysteresis": _of_brakes(
@@ -169,9 +169,9 @@ TABLE = {
         "load_transfer",
         "two products per wheel and step",
         {"moving loads": 4},
-        excludes=SUSPENSION,
+        excludes=SUSPENSION_KEY,
         why="whose springs carry the loads",
-        usual={},
+        usual_value={},
     ),
     "measured_pressures": Entry(
         "Pressures from a file in place of pedal and controller",
@@ -184,13 +184,13 @@ TABLE = {
         "port",
         "one exchange per sample, and what stands behind it",
         {"asked": 1},
-        excludes=MEASURED,
+        excludes=MEASURED_PRESSURES_KEY,
         why="which leaves no controller that could be asked",
-        usual={},
+        usual_value={},
     ),
     "pressure_calibration": _of_sensor(
         "pressures",
-        SCALE,
+        SCALE_KEYS,
         "Pressures that come out too large or shifted",
         "a product and a sum per brake and sample",
         "wrong signals",
@@ -201,13 +201,13 @@ TABLE = {
         "pressure",
         "two exponentials per wheel and sample",
         {"time constants": 8},
-        excludes=MEASURED,
+        excludes=MEASURED_PRESSURES_KEY,
         why="which are the chambers'",
-        usual={},
+        usual_value={},
     ),
     "pressure_noise": _of_sensor(
         "pressures",
-        NOISE,
+        NOISE_KEYS,
         "White noise on the pressures that a controller asks for",
         "a random number per brake and sample",
         "noisy signals",
@@ -215,7 +215,7 @@ TABLE = {
     ),
     "pressure_quantisation": _of_sensor(
         "pressures",
-        BITS,
+        CONVERTER_KEYS,
         "Pressures that a controller asks for, in the steps of a converter",
         "a rounding per brake and sample",
         "converted signals",
@@ -235,7 +235,7 @@ TABLE = {
         "tyres.own_rear",
         "a second table of friction per surface",
         {"tables": 1},
-        usual=True,
+        usual_value=True,
     ),
     "relaxation": Entry(
         "Slip angles that lag behind the motion by a relaxation length",
@@ -243,7 +243,7 @@ TABLE = {
         "a state per wheel, exact within a step",
         {"lags": 4},
         modules=("models.brake.relaxation",),
-        usual={"front": 0.3, "rear": 0.3},  # m, chosen
+        usual_value={"front": 0.3, "rear": 0.3},  # m, chosen
     ),
     "reservoir": Entry(
         "A reservoir whose pressure falls as chambers fill from it",
@@ -251,7 +251,7 @@ TABLE = {
         "a sum over the chambers per sample",
         {"volumes": 4},
         ("pressure_dynamics",),
-        usual=40.0,  # l, of a truck
+        usual_value=40.0,  # l, of a truck
         leave_out=_without_reservoir,
     ),
     "second_surface": Entry(
@@ -265,7 +265,7 @@ TABLE = {
     ),
     "signal_calibration": _of_sensor(
         "signals",
-        SCALE,
+        SCALE_KEYS,
         "Wheel speeds that are read too large or shifted",
         "a product and a sum per wheel and sample",
         "wrong signals",
@@ -273,7 +273,7 @@ TABLE = {
     ),
     "signal_noise": _of_sensor(
         "signals",
-        NOISE,
+        NOISE_KEYS,
         "White noise on the wheel speeds that the controller is given",
         "a random number per wheel and sample",
         "noisy signals",
@@ -281,7 +281,7 @@ TABLE = {
     ),
     "signal_quantisation": _of_sensor(
         "signals",
-        BITS,
+        CONVERTER_KEYS,
         "Wheel speeds in the steps of a converter",
         "a rounding per wheel and sample",
         "converted signals",
@@ -309,14 +309,14 @@ TABLE = {
         "the edges of every wheel within each sample",
         {"asked": 1},
         ("port",),
-        usual={},
+        usual_value={},
     ),
     "towed": Entry(
         "Bodies that the vehicle of a file tows by a hitch, on springs and wheels of their own",
         "vehicle.file",
         "the coordinates of its hitch and wheels, and a tyre, a brake and a chamber per wheel",
-        needs=SUSPENSION,
-        there=_tows,
+        needs=SUSPENSION_KEY,
+        there=_tows_bodies,
         leave_out=without_trailer,
     ),
     "trailer": Entry(
@@ -324,7 +324,7 @@ TABLE = {
         "trailer",
         "two coordinates and four wheels more",
         {"coordinates": 2, "wheels": 4},
-        excludes=SUSPENSION,
+        excludes=SUSPENSION_KEY,
         why="whose file says what it tows",
         put_in=_with_trailer,
     ),

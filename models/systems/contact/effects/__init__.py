@@ -120,14 +120,14 @@ TABLE = {
         {"laws of friction": 1},
         SATURATION,
         modules=("models.contact.fastsim_falling",),
-        usual={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
+        usual_value={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
     ),
     "spin": Entry(
         "Spin of the wheel about the contact's normal",
         "creepage.spin",
         "nothing: the third column of the same creepages",
         {"motions with spin": 1},
-        usual=0.3,  # 1/m, as of a wheel of usual conicity
+        usual_value=0.3,  # 1/m, as of a wheel of usual conicity
         there=lambda scene: bool(scene.creepage.spin) or _spin_is_swept(scene),
         leave_out=_without_spin,
     ),

@@ -16,10 +16,10 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
     def there(scene: Any) -> bool:
         values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
         acts = any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
-        return acts or (key in MEASURED and _measured(scene))
+        return acts or (key in MEASURED_CONTROLS and _is_measured_drive(scene))
 
     def leave_out(table: dict[str, Any], scene: Any) -> None:
-        if key in MEASURED and _measured(scene):
+        if key in MEASURED_CONTROLS and _is_measured_drive(scene):
             raise InputError(scene.file, key, None, "belongs to the measured drive: leave out manoeuvres.NAME.measured")
         for manoeuvre in table["manoeuvres"].values():
             manoeuvre.pop(key, None)
@@ -32,7 +32,7 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
     return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in)
 
 
-ALONE, TOWING = "r19_free", "r19_caravan"
+CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"
 """Shipped vehicles, the second of which is the first with a caravan."""
 
 
@@ -40,25 +40,25 @@ def without_trailer(table: Table, scene: Any) -> None:
     """Replace the shipped car and caravan by the shipped car. InputError for another file, which its user must
     change.
     """
-    if scene.vehicle.file != TOWING:
+    if scene.vehicle.file != CAR_WITH_CARAVAN:
         allowed = "has bodies with a hitch: name a vehicle file without them"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
-    table["vehicle"]["file"] = ALONE
+    table["vehicle"]["file"] = CAR_ALONE
 
 
 def with_trailer(table: Table, scene: Any) -> None:
     """Replace the shipped car by the shipped car with its caravan. InputError for another file."""
-    if scene.vehicle.file != ALONE:
+    if scene.vehicle.file != CAR_ALONE:
         allowed = "has no trailer: add a body with a hitch, and its wheels, to that file"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
-    table.setdefault("vehicle", {})["file"] = TOWING
+    table.setdefault("vehicle", {})["file"] = CAR_WITH_CARAVAN
 
 
-MEASURED = ("steer", "brake", "drive")
+MEASURED_CONTROLS = ("steer", "brake", "drive")
 """Controls that a measured drive has."""
 
 
-def _measured(scene: Any) -> bool:
+def _is_measured_drive(scene: Any) -> bool:
     """Whether a manoeuvre is a measured drive."""
     return any(manoeuvre.measured for manoeuvre in scene.manoeuvres.values())
 
@@ -70,14 +70,16 @@ def _without_measured(table: dict[str, Any], scene: Any) -> None:
         manoeuvre.pop("stretch", None)
 
 
-LOOK = "a look into a table of times per call"
+TABLE_LOOKUP_COST = "a look into a table of times per call"
 TABLE = {
-    "braking": _of_manoeuvres("brake", "Torque of the brakes", LOOK, {"controls": 1}, [[1.0, 0.0], [1.2, 1000.0]]),
+    "braking": _of_manoeuvres(
+        "brake", "Torque of the brakes", TABLE_LOOKUP_COST, {"controls": 1}, [[1.0, 0.0], [1.2, 1000.0]]
+    ),
     "driving": _of_manoeuvres(
-        "drive", "Torque of the driven wheels", LOOK, {"controls": 1}, [[1.0, 0.0], [1.2, 300.0]]
+        "drive", "Torque of the driven wheels", TABLE_LOOKUP_COST, {"controls": 1}, [[1.0, 0.0], [1.2, 300.0]]
     ),
     "steering": _of_manoeuvres(
-        "steer", "Front wheels that the driver turns", LOOK, {"controls": 1}, [[0.5, 0.0], [0.8, 0.02]]
+        "steer", "Front wheels that the driver turns", TABLE_LOOKUP_COST, {"controls": 1}, [[0.5, 0.0], [0.8, 0.02]]
     ),
     "rough_road": _of_manoeuvres(
         "rough", "A rough road under all tyres, of plane waves", "a cosine per wave, tyre and call", {"waves": 48}, True
@@ -86,7 +88,7 @@ TABLE = {
         "The steer angle and the speed of a measured drive, with the torques that this speed takes",
         "manoeuvres.NAME.measured",
         "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
-        there=_measured,
+        there=_is_measured_drive,
         leave_out=_without_measured,
         modules=("models.measured.drive", "models.systems.handling.following"),
     ),
@@ -95,7 +97,7 @@ TABLE = {
         "tyres.inclination",
         "nothing: the same forces at an angle, with spin",
         {"leaning wheels": 4},
-        usual=0.02,
+        usual_value=0.02,
     ),
     "trailer": Entry(
         "Bodies that the vehicle tows by a hitch, on springs and wheels of their own",

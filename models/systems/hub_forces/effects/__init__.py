@@ -6,7 +6,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import Entry, Table
 
 
-def _chosen(
+def _selected_effect(
     says: str, place: str, cost: str, counts: dict[str, int], usual: str, instead: str | None, **more: Any
 ) -> Entry:
     """An effect that a word of the scene selects: ``usual`` with the effect, ``instead`` without it, None for the
@@ -39,30 +39,30 @@ def _keep_road(table: Table, scene: Any) -> None:
     raise InputError(scene.file, "road", None, "can only give way to forces.file and angles.file: name them")
 
 
-NOISE: dict[str, Any] = {"needs": ("virtual_measurement",), "why": "for files have the noise that they have"}
-BETWEEN = "as forces.interpolation is one word"
-HOLDING = "as one moment holds roll and pitch"
-FILTER = tuple(f"models.systems.hub_forces.{name}" for name in ("tilt_filter", "tilt_march"))
+NOISE_NEEDS: dict[str, Any] = {"needs": ("virtual_measurement",), "why": "for files have the noise that they have"}
+INTERPOLATION_EXCLUSION = "as forces.interpolation is one word"
+HOLDING_EXCLUSION = "as one moment holds roll and pitch"
+FILTER_MODULES = tuple(f"models.systems.hub_forces.{name}" for name in ("tilt_filter", "tilt_march"))
 TABLE = {
-    "angle_noise": _chosen(
+    "angle_noise": _selected_effect(
         "White noise on every sample of roll, pitch and their rates",
         "angles.noise",
         "four random numbers per sample before the run; only a stabiliser reads them",
         {"noisy angles": 4},
         "white",
         "none",
-        **NOISE,
+        **NOISE_NEEDS,
     ),
-    "force_noise": _chosen(
+    "force_noise": _selected_effect(
         "White noise on every sample of the hub forces",
         "forces.noise",
         "a random number per component and sample before the run, no more in it",
         {"noisy forces": 24},
         "white",
         "none",
-        **NOISE,
+        **NOISE_NEEDS,
     ),
-    "held_forces": _chosen(
+    "held_forces": _selected_effect(
         "Forces that stay what they are from one sample to the next",
         "forces.interpolation",
         "a march of its own from sample to sample",
@@ -70,9 +70,9 @@ TABLE = {
         "held",
         None,
         excludes=("smooth_forces",),
-        why=BETWEEN,
+        why=INTERPOLATION_EXCLUSION,
     ),
-    "kalman_filter": _chosen(
+    "kalman_filter": _selected_effect(
         "Roll and pitch held by a moment towards a Kalman filter's estimate",
         "stabilise.method",
         "a filter over all samples before the run, and two springs and dampers in it",
@@ -80,10 +80,10 @@ TABLE = {
         "kalman",
         "none",
         excludes=("prescribed_angles",),
-        why=HOLDING,
-        modules=FILTER,
+        why=HOLDING_EXCLUSION,
+        modules=FILTER_MODULES,
     ),
-    "prescribed_angles": _chosen(
+    "prescribed_angles": _selected_effect(
         "Roll and pitch enforced as measured, smoothed",
         "stabilise.method",
         "derivatives of the smoothed angles before the run, and in every call a mass matrix solved for two moments",
@@ -91,9 +91,9 @@ TABLE = {
         "prescribed",
         "none",
         excludes=("kalman_filter",),
-        why=HOLDING,
+        why=HOLDING_EXCLUSION,
     ),
-    "smooth_forces": _chosen(
+    "smooth_forces": _selected_effect(
         "Forces with continuous rates between the samples",
         "forces.interpolation",
         "cubic pieces in place of straight ones",
@@ -101,9 +101,9 @@ TABLE = {
         "smooth",
         None,
         excludes=("held_forces",),
-        why=BETWEEN,
+        why=INTERPOLATION_EXCLUSION,
     ),
-    "turning_forces": _chosen(
+    "turning_forces": _selected_effect(
         "Forces that turn with the hub or the chassis",
         "forces.frame",
         "a rotation per hub and call",

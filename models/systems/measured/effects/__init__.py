@@ -41,7 +41,7 @@ def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple
         cost,
         {count: 2},
         modules=modules,
-        usual=method,
+        usual_value=method,
         there=lambda scene: scene.stabilise.method == method,
         leave_out=leave_out,
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.core.noise import ACCELEROMETERS, normal
+from models.core.noise import ACCELEROMETERS, normal_samples
 from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
@@ -23,7 +23,7 @@ EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
 COUNTS = {"all": {"channels": 3}}
 
 CHANNELS = ("ax1", "ay1", "az1 and so on, three per sensor")
-USUAL = 157.0
+USUAL_RANGE = 157.0
 """m/s^2, 16 g: the largest range of most micromechanical accelerometers."""
 PLACE = "effects.accelerometers.sampling_rate"
 
@@ -61,14 +61,16 @@ class Parameters(Strict):
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
-def names(p: Parameters) -> list[tuple[str, ...]]:
+def channels_of_sensors(p: Parameters) -> list[tuple[str, ...]]:
     """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
     return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
 
 
 def readings_of(result: Result, p: Parameters) -> np.ndarray:
     """Readings (n, sensors, 3) in m/s^2 of the accelerometers, from a run's result."""
-    return np.stack([np.column_stack([result[channel] for channel in channels]) for channels in names(p)], axis=1)
+    return np.stack(
+        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(p)], axis=1
+    )
 
 
 @dataclass(frozen=True)
@@ -84,24 +86,24 @@ class Accelerometers:
         values = self._readings(assembly, run, model, np.unique(row))[number]
         return {
             channel: ("m/s^2", f"accelerometer {sensor}, specific force along the chassis' {axis}", values[:, i, j])
-            for i, (sensor, channels) in enumerate(zip(p.sensors, names(p), strict=True))
+            for i, (sensor, channels) in enumerate(zip(p.sensors, channels_of_sensors(p), strict=True))
             for j, (axis, channel) in enumerate(zip("xyz", channels, strict=True))
         }
 
     def _readings(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
         """Readings (samples, sensors, 3) at ``rows``, the run's rows at the sensors' sampling times."""
-        from models.sensors.sensor_array import on_bracket, readings
+        from models.sensors.sensor_array import on_bracket, sensor_readings
 
         p, y = self.parameters, run.states[rows]
         moved = np.array([model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows])
         places = np.array(list(p.positions().values()))
-        values = readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
+        values = sensor_readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
                 values[:, i] = on_bracket(
                     values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
                 )
-        noise = normal(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
+        noise = normal_samples(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
         return values + p.deviation * noise.reshape(values.shape)
 
 
@@ -110,8 +112,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     check_rate(assembly.scene, PLACE, p.sampling_rate)
     axes = {
         f"{sensor}, {axis}": channel
-        for sensor, channels in zip(p.sensors, names(p), strict=True)
+        for sensor, channels in zip(p.sensors, channels_of_sensors(p), strict=True)
         for axis, channel in zip("xyz", channels, strict=True)
     }
-    kept = within_range("accelerometers", axes, "m/s^2", p.range or USUAL)
+    kept = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
     return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, kept))

@@ -75,7 +75,7 @@ def compression(pieces: np.ndarray, period: float, stiffness: float, damping: fl
     steady_part = sum(particular[power, piece] * since**power for power in range(len(particular)))
     if tau == 0.0:
         return np.asarray(steady_part)
-    starts = _starts(particular, pieces[0, 0] / stiffness, period, tau)
+    starts = _start_compressions(particular, pieces[0, 0] / stiffness, period, tau)
     return steady_part + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
@@ -88,7 +88,7 @@ def _particular_solution(pieces: np.ndarray, tau: float) -> np.ndarray:
     return total
 
 
-def _starts(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
+def _start_compressions(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
     """Compression (m) at the start of each piece, equal to that at the end of the piece before."""
     powers = period ** np.arange(len(particular))
     gained = powers @ particular - particular[0] * math.exp(-period / tau)

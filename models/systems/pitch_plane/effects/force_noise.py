@@ -7,7 +7,7 @@ forces in every engine and at every step.
 from dataclasses import replace
 from typing import Any
 
-from models.core.noise import normal
+from models.core.noise import normal_samples
 from models.core.signals import Sampled, Smooth
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
@@ -31,5 +31,5 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with noise added to both wheel forces."""
     signal = assembly.input
     assert isinstance(signal, Sampled | Smooth)
-    noisy = signal.values + p.deviation * normal(p.seed, p.path, len(signal.values), 2)
+    noisy = signal.values + p.deviation * normal_samples(p.seed, p.path, len(signal.values), 2)
     return replace(assembly, input=replace(signal, values=noisy))

@@ -11,14 +11,14 @@ import numpy as np
 from models.core.noise import GYRO
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy, within_range
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy_reading, within_range
 
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.1}
 COUNTS = {"all": {"channels": 1}}
 
 CHANNELS = ("gyro",)
-USUAL = 35.0
+USUAL_RANGE = 35.0
 """rad/s, 2000 deg/s: the largest range of most micromechanical gyros."""
 PLACE = "effects.gyro.sampling_rate"
 
@@ -44,12 +44,12 @@ class Gyro:
 
     def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
         """Channel ``gyro`` (rad/s), the gyro's reading of the pitch rate, positive nose up."""
-        reading = noisy(self.parameters, GYRO, times, states[:, 7], assembly.scene, PLACE)
+        reading = noisy_reading(self.parameters, GYRO, times, states[:, 7], assembly.scene, PLACE)
         return {"gyro": ("rad/s", "pitch rate as a gyro reads it, nose up", reading)}
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with a gyro's reading among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
-    kept = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL)
+    kept = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL_RANGE)
     return replace(assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, kept))

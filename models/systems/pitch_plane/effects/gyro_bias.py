@@ -11,7 +11,7 @@ from pydantic import Field
 
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
-from models.sensors.inertial_unit import DEGREES_PER_HOUR, bias
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, bias_path
 from models.systems.pitch_plane.effects.gyro import Gyro
 from models.systems.pitch_plane.sampling import PATH, instant_numbers
 
@@ -34,7 +34,7 @@ class Parameters(Strict):
 
 
 @dataclass(frozen=True)
-class Biased:
+class BiasedGyro:
     """A gyro with a bias added to its samples."""
 
     gyro: Gyro
@@ -45,7 +45,7 @@ class Biased:
         p, rate = self.parameters, self.gyro.parameters.sampling_rate
         unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
         number = instant_numbers(times, rate)
-        drift = bias(
+        drift = bias_path(
             int(number[-1]) + 1,
             1 / rate,
             p.turn_on * DEGREES_PER_HOUR,
@@ -59,5 +59,5 @@ class Biased:
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with its gyro replaced by one with a bias."""
-    biased = tuple(Biased(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
+    biased = tuple(BiasedGyro(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
     return replace(assembly, outputs=biased)

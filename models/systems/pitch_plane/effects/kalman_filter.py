@@ -58,13 +58,13 @@ CHANNELS = (
 )
 
 
-BANDWIDTH = 3.0
+PULL_BANDWIDTH = 3.0
 """Hz. Above the filter's own, (q/r)^(1/4) = 1.2 Hz at 0.2 % of force noise and an angle of 0.1 degree white at 1 kHz,
 so that the vehicle follows what the filter corrects; not more, because all that is faster in the estimate is the
 measurement's noise: the moment's rms grows from 0.4 % of I pitch'' at 3 Hz to 1.4 % at 8 Hz."""
 
 
-SURPRISE = 4.0
+INNOVATION_LIMIT = 4.0
 """Largest mean of the normalised innovation squared with which a run is made: errors twice as large as stated. A right
 filter has 1; one that is sure of a model with 5 % wrong inertia 1.1 to 1.3."""
 
@@ -86,7 +86,7 @@ class Parameters(Strict):
         default=0.0,
         zero=True,
     )
-    bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=BANDWIDTH)
+    bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=PULL_BANDWIDTH)
     damping_ratio: float = quantity("", "of the same", default=0.7)
     smoother: bool = Field(False, description="use all measurements for every time, later ones too")
 
@@ -97,26 +97,26 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
     stiffness, damping = spring_of(assembly.parameters, p.bandwidth, p.damping_ratio)
-    moment = guide.values @ np.array([[stiffness], [damping]]) + guide.lacking[:, None]
+    moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
     sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
     guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
         guided,
-        outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
-        doubts=(*guided.doubts, *_doubts(p, guide)),
-        assumptions=(*guided.assumptions, _assumption(guide)),
+        outputs=(*guided.outputs, partial(_guiding_channels, guide, stiffness, damping)),
+        doubts=(*guided.doubts, *_filter_objections(p, guide)),
+        assumptions=(*guided.assumptions, _innovation_assumption(guide)),
     )
 
 
 @dataclass(frozen=True)
-class Guide:
+class GuidingEstimate:
     """Estimated pitch that a guided run follows, at times i ``period`` (s).
 
     states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
     values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
-    inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
-    used, missed : (n,), measured values so far
-    surprise : (n,), sum of the normalised innovations squared so far
+    inertia : (n,), share by which 1/I is estimated above the model's; inertia_moment : (n,), the moment (N m) to it
+    used_values, missed_values : (n,), measured values so far
+    innovation_sum : (n,), sum of the normalised innovations squared so far
     consistency : what all innovations say of the filter
     """
 
@@ -125,18 +125,18 @@ class Guide:
     values: np.ndarray
     deviations: np.ndarray
     inertia: np.ndarray
-    lacking: np.ndarray
-    used: np.ndarray
-    missed: np.ndarray
-    surprise: np.ndarray
+    inertia_moment: np.ndarray
+    used_values: np.ndarray
+    missed_values: np.ndarray
+    innovation_sum: np.ndarray
     consistency: Consistency
 
 
-_LATEST: dict[bytes, Guide] = {}
+_LATEST_GUIDE: dict[bytes, GuidingEstimate] = {}
 """The last guide, by all that it depends on: a check and a run per engine need it once."""
 
 
-def guide_of(assembly: Assembly, p: Parameters) -> Guide:
+def guide_of(assembly: Assembly, p: Parameters) -> GuidingEstimate:
     """The estimated pitch that a force-excited assembly follows; InputError for an unusable file, RunFailed from the
     filter.
     """
@@ -147,7 +147,7 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     signal = type(forces).__name__, forces.values, forces.period, forces.held
     kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, p))
-    if key not in _LATEST:
+    if key not in _LATEST_GUIDE:
         estimated = estimate(
             assembly,
             measured,
@@ -156,31 +156,31 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
             inertia_deviation=p.inertia_deviation,
             smoother=p.smoother,
         )
-        _LATEST.clear()
-        _LATEST[key] = _read(assembly, estimated, measured)
-    return _LATEST[key]
+        _LATEST_GUIDE.clear()
+        _LATEST_GUIDE[key] = _guiding_estimate(assembly, estimated, measured)
+    return _LATEST_GUIDE[key]
 
 
-def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> Guide:
-    from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
+def _guiding_estimate(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurement") -> GuidingEstimate:
+    from models.systems.pitch_plane.pitch_filter import INERTIA_SHARE, KEPT_STATES, PITCH, PITCH_RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
-    deviations = np.sqrt(estimated.errors()[:, [PITCH, RATE], [PITCH, RATE]])
-    share, names = estimated.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    deviations = np.sqrt(estimated.errors()[:, [PITCH, PITCH_RATE], [PITCH, PITCH_RATE]])
+    share, names = estimated.states[:, INERTIA_SHARE], {PITCH: "pitch", PITCH_RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
-    relative[KEPT] = estimated.states[:, :6].T
+    relative[KEPT_STATES] = estimated.states[:, :6].T
     moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
     fits = consistency(estimated.innovations, [names[column] for column in measurement.columns])
-    return Guide(
+    return GuidingEstimate(
         estimated.period,
         estimated.states,
-        estimated.states[:, [PITCH, RATE]],
+        estimated.states[:, [PITCH, PITCH_RATE]],
         deviations,
         share,
         share * moment,
-        np.cumsum(estimated.used),
-        np.cumsum(estimated.missed),
-        np.nancumsum(estimated.surprises),
+        np.cumsum(estimated.used_values),
+        np.cumsum(estimated.missed_values),
+        np.nancumsum(estimated.normalised_innovations),
         fits,
     )
 
@@ -188,10 +188,13 @@ def _read(assembly: Assembly, estimated: "PitchEstimate", measurement: "Measurem
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     """The measured columns of the file with their standard deviations; InputError for what the filter cannot use."""
     from models.core.time_series import read_time_series
-    from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
+    from models.systems.pitch_plane.pitch_filter import PITCH, PITCH_RATE, Measurement
 
     scene, place = assembly.scene, "effects.kalman_filter"
-    known = (("pitch", RADIANS, PITCH, p.pitch_deviation), ("pitch_rate", RADIANS_PER_SECOND, RATE, p.rate_deviation))
+    known = (
+        ("pitch", RADIANS, PITCH, p.pitch_deviation),
+        ("pitch_rate", RADIANS_PER_SECOND, PITCH_RATE, p.rate_deviation),
+    )
     given = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
     if not given:
         raise InputError(scene.file, place, None, "needs pitch_deviation, rate_deviation or both: the columns to read")
@@ -215,24 +218,24 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     )
 
 
-def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+def _check_surprise(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
     """Refuse a filter whose measurement contradicts its forces or its model: it would draw the vehicle anywhere."""
-    mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
-    if mean > SURPRISE:
+    mean = float(guide.innovation_sum[-1] / max(guide.used_values[-1], 1))
+    if mean > INNOVATION_LIMIT:
         raise InputError(
             assembly.scene.file,
             "effects.kalman_filter",
             None,
             f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
-            f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones",
+            f"what the deviations allow (at most {INNOVATION_LIMIT:g}): check sign and unit, or state larger ones",
         )
 
 
-def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
+def _filter_objections(p: Parameters, guide: GuidingEstimate) -> tuple[str, ...]:
     """Objections to the filter that follow from its own innovations."""
     if guide.consistency.consistent:
         return ()
-    square = guide.consistency.figures[0]
+    square = guide.consistency.statistics[0]
     known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
     remedy = (
         "the stated deviations are too large: state smaller ones"
@@ -242,7 +245,7 @@ def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
     return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
 
 
-def _assumption(guide: Guide) -> Assumption:
+def _innovation_assumption(guide: GuidingEstimate) -> Assumption:
     """Assumption that the innovations' statistics are those of a correctly tuned filter."""
     return Assumption(
         "innovations",
@@ -257,16 +260,16 @@ def _assumption(guide: Guide) -> Assumption:
 
 def _places_in_intervals(consistency: Consistency, run: Result) -> Watched:
     """Position of each statistic in its interval, from -1 at the lower end to 1 at the upper one."""
-    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.figures}
+    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in consistency.statistics}
 
 
-def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+def _check_bandwidth(assembly: Assembly, p: Parameters, guide: GuidingEstimate) -> None:
     """Refuse a bandwidth at which the moment reacts more slowly than the pitch diverges. Only vertical forces make it
     diverge.
     """
     if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
         return
-    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total)
+    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total_inertia)
     growth = share * float(np.sqrt(np.mean(guide.values[:, 1] ** 2)))
     if 2 * math.pi * p.bandwidth <= growth:
         raise InputError(
@@ -277,14 +280,14 @@ def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
         )
 
 
-def _channels(
-    guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
+def _guiding_channels(
+    guide: GuidingEstimate, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
 ) -> Channels:
     """Channels of the guiding moment and of the estimate that it follows, at the saved times."""
     grid = guide.period * np.arange(len(guide.values))
     pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
         np.interp(times, grid, column)
-        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.lacking)
+        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.inertia_moment)
     )
     latest = np.clip(np.floor(times / guide.period + 1e-6).astype(int), 0, len(grid) - 1)
     moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
@@ -296,7 +299,7 @@ def _channels(
         "pitch_deviation": ("rad", "standard deviation of the estimated pitch", pitch_deviation),
         "pitch_rate_deviation": ("rad/s", "standard deviation of its estimated rate", rate_deviation),
         "inertia_share": ("", "share by which 1/I of the chassis is estimated to exceed the scene's", inertia),
-        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used[latest]),
-        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed[latest]),
-        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.surprise[latest]),
+        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used_values[latest]),
+        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed_values[latest]),
+        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.innovation_sum[latest]),
     }

@@ -12,7 +12,7 @@ import numpy as np
 from models.core.noise import PITCH_SENSOR
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy_reading
 
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.01}
@@ -39,5 +39,5 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 def pitch_reading(p: Any, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
     """Channel ``pitch_reading`` (rad), a sensor's reading of the pitch, positive nose up."""
-    reading = noisy(p, PITCH_SENSOR, times, states[:, 3], assembly.scene, PLACE)
+    reading = noisy_reading(p, PITCH_SENSOR, times, states[:, 3], assembly.scene, PLACE)
     return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", reading)}

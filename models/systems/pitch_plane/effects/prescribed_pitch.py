@@ -12,7 +12,7 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.signals import Smooth, Stacked
-from models.core.smoothing import smoothed
+from models.core.smoothing import low_passed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
 from models.engines.assembly import GUIDED, Assembly, Mode
@@ -53,19 +53,19 @@ def prescribe(
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
-    from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, sparse
+    from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, sparse_record_warning
 
     scene = assembly.scene
     _check_scene(scene, columns)
     values, period = read_time_series(scene.path(p.file, f"effects.{effect}.file"), columns)
     if p.bandwidth is not None:
-        values = smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
+        values = low_passed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
     motion = Smooth(values, period, derivatives=2, degree=5)
     check_end(scene, f"effects.{effect}.file", p.file, motion.end)
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
     guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
-    doubt = sparse(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
+    doubt = sparse_record_warning(len(values), period, scene.run.duration, CHASSIS_SAMPLE_TIME)
     return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
 
 

@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
-from models.systems.pitch_plane.assumptions import STEEPEST
+from models.systems.pitch_plane.assumptions import STEEPEST_PITCH
 
 EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
 COST = "height and slope under each wheel, read from a table of half steps"
@@ -38,8 +38,8 @@ class Parameters(Strict):
     gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
     grade: float | None = Field(
         None,
-        gt=-STEEPEST,
-        lt=STEEPEST,
+        gt=-STEEPEST_PITCH,
+        lt=STEEPEST_PITCH,
         json_schema_extra={"unit": "rad"},
         description="study, hills, iso8608: slope angle that the road comes to after its fade-in, positive uphill",
     )
@@ -59,16 +59,18 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
     _check_keys(assembly.scene.file, p)
     distance = p.speed * assembly.scene.run.duration
-    profile, kinks = _profile(assembly.scene, p, distance)
+    profile, kinks = _road_profile(assembly.scene, p, distance)
     wheelbase = assembly.parameters.a + assembly.parameters.b
     driven = assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
     says = "the road is so even that a tyre touches it in one point below its wheel"
     remedy = "smooth the road over what a tyre's patch feels, some 0.2 m, or take a gentler one"
-    slope = Assumption("even road", says, remedy, partial(_slopes, p.speed), "rad", -STEEPEST, STEEPEST)
+    slope = Assumption(
+        "even road", says, remedy, partial(_slopes_under_wheels, p.speed), "rad", -STEEPEST_PITCH, STEEPEST_PITCH
+    )
     return replace(driven, assumptions=(*driven.assumptions, slope))
 
 
-def _slopes(speed: float, run: Result) -> Watched:
+def _slopes_under_wheels(speed: float, run: Result) -> Watched:
     """Slope angle (n,) in rad of the road under each wheel, positive uphill."""
     metres = speed * run.times
     slopes = {f"{axle} wheel": -np.gradient(run[f"zeta{i + 1}"], metres) for i, axle in enumerate(("front", "rear"))}
@@ -89,10 +91,10 @@ def _check_keys(file: str, p: Parameters) -> None:
             raise InputError(file, f"effects.road.{name}", None, allowed)
 
 
-def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
+def _road_profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
     """The road profile, and the stations (m) at which it is only twice continuously differentiable."""
     if p.source in ("opencrg", "csv"):
-        profile = _measured(scene, p, distance)
+        profile = _measured_road(scene, p, distance)
         return profile, (profile.start, profile.start + profile.window_length)
     if p.source == "iso8608":
         from models.road.iso8608 import iso8608_road
@@ -106,13 +108,13 @@ def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[flo
     faded_in = profile.window_length
     if p.grade is None:
         return profile, (0.0, faded_in)
-    from models.road.grade import TRANSITION, Graded
+    from models.road.grade import TRANSITION_LENGTH, Graded
 
-    return Graded(profile, p.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION)
+    return Graded(profile, p.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION_LENGTH)
 
 
-def _measured(scene: Any, p: Parameters, distance: float) -> Any:
-    from models.road.continuation import RUN_IN, continued, run_in
+def _measured_road(scene: Any, p: Parameters, distance: float) -> Any:
+    from models.road.continuation import RUN_IN, continued_road, run_in
 
     path, track = scene.path(p.file, "effects.road.file"), p.track or "mean"
     length = RUN_IN if p.run_in is None else p.run_in
@@ -125,7 +127,7 @@ def _measured(scene: Any, p: Parameters, distance: float) -> Any:
 
         raw = read_csv_road(path, track)
     _check_length(scene, p, raw, distance, length)
-    longer = continued(raw, str(p.beyond_end), distance, path)
+    longer = continued_road(raw, str(p.beyond_end), distance, path)
     assert isinstance(longer, type(raw))
     return run_in(longer, length)
 

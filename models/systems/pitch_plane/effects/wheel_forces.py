@@ -10,7 +10,7 @@ from pydantic import Field
 from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import Interpolation, sampled
+from models.core.signals import Interpolation, signal_from_samples
 from models.core.strict import Strict
 from models.core.tables import NEWTONS
 from models.engines.assembly import Assembly
@@ -47,7 +47,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     scene = assembly.scene
     columns = {"front": NEWTONS, "rear": NEWTONS}
     values, period = read_time_series(scene.path(p.file, "effects.wheel_forces.file"), columns)
-    signal = sampled(values, period, p.interpolation)
+    signal = signal_from_samples(values, period, p.interpolation)
     check_end(scene, "effects.wheel_forces.file", p.file, signal.end)
     turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
     driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
@@ -75,7 +75,7 @@ def _doubts_about_forces(
         ((front,), (rear,)),
         scene.run.duration,
         IN_FILE,
-        rests=not scene.start,
+        starts_at_rest=not scene.start,
         turn=assembly.mode == "force-body",
     )
     looked = (*check(axles), *_samples((front, rear), values, period))
@@ -89,10 +89,10 @@ def _doubts_about_forces(
             p.file,
             f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(each.text for each in findings), _balance(axles, p)
+    return tuple(each.text for each in findings), _balance_assumptions(axles, p)
 
 
-def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
+def _balance_assumptions(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
     """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
     from models.measured.axle_balance import equilibrium_residual
 
@@ -107,7 +107,7 @@ def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
             says,
             f"correct the forces' calibration or zero, or {symbols} of the vehicle; "
             f'if it is meant so: effects.wheel_forces.accept = ["{name}"]',
-            partial(_steady, float(means.accelerations[i])),
+            partial(_steady_accelerations, float(means.accelerations[i])),
             unit,
             -float(means.known[i]),
             float(means.known[i]),
@@ -117,7 +117,7 @@ def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
     )
 
 
-def _steady(acceleration: float, run: Result) -> Watched:
+def _steady_accelerations(acceleration: float, run: Result) -> Watched:
     return {"chassis": np.array([acceleration])}
 
 

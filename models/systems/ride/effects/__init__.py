@@ -35,7 +35,7 @@ def _vehicle(scene: Any) -> Any:
     return vehicle_of(scene)
 
 
-def _equal(key: str) -> Callable[[Table, Any], None]:
+def _equal_heights_edit(key: str) -> Callable[[Table, Any], None]:
     """Return the edit that sets ``key`` of [road] so that wheels meet equal heights."""
 
     def leave_out(table: Table, scene: Any) -> None:
@@ -44,7 +44,7 @@ def _equal(key: str) -> Callable[[Table, Any], None]:
     return leave_out
 
 
-def _straighten(table: Table, scene: Any) -> None:
+def _straighten_curves(table: Table, scene: Any) -> None:
     """Replace the springs' curves by their slopes at rest."""
     table["vehicle"]["small_motion"] = True
 
@@ -89,16 +89,16 @@ TABLE = {
         {"bent springs": 1},
         modules=("models.ride.statistical_linearisation",),
         there=_omissions_of_sort("curves"),
-        leave_out=_straighten,
+        leave_out=_straighten_curves,
     ),
     "delay": Entry(
         "The delay from front to rear: every axle meets at once what the first one meets",
         "road.front_rear",
         "a filter of the road per axle",
         {"delays": 1},
-        usual="delayed",
+        usual_value="delayed",
         there=_omissions_of_sort("delay"),
-        leave_out=_equal("front_rear"),
+        leave_out=_equal_heights_edit("front_rear"),
     ),
     "drag": _of_vehicle(
         "Drag of the air, which loads the axles by the speed", BY_SPEED, lambda scene: bool(_vehicle(scene).drags)
@@ -113,7 +113,7 @@ TABLE = {
         "vehicle.operating_point",
         "a stiffness per preloaded spring",
         {"preloads": 1},
-        usual="loaded",
+        usual_value="loaded",
         there=lambda scene: scene.vehicle.operating_point == "loaded",
     ),
     "measured_road": Entry(
@@ -134,16 +134,16 @@ TABLE = {
         "road.cutoff",
         "a state more per filter of the road",
         {"states": 4},
-        usual=20.0,
+        usual_value=20.0,
     ),
     "second_track": Entry(
         "The second track: left and right wheels of an axle meet the same height",
         "road.left_right",
         "a second filter of the road per axle",
         {"heights": 2},
-        usual="modelled",
+        usual_value="modelled",
         there=_omissions_of_sort("second_track"),
-        leave_out=_equal("left_right"),
+        leave_out=_equal_heights_edit("left_right"),
     ),
     "side_forces": _of_vehicle(
         "Side forces of tyres, by slip angle", BY_SPEED, lambda scene: bool(_vehicle(scene).side_forces)

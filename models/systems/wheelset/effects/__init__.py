@@ -30,9 +30,9 @@ def _of_parameters(says: str, keys: tuple[str, ...], cost: str, counts: dict[str
         return change
 
     def usual(key: str) -> float:
-        from models.rail.wheelset import CHOSEN
+        from models.rail.wheelset import CHOSEN_WHEELSET
 
-        return float(getattr(CHOSEN, key))
+        return float(getattr(CHOSEN_WHEELSET, key))
 
     return Entry(
         says,
@@ -69,7 +69,7 @@ def _with_profiles(table: Table, scene: Any) -> None:
     table.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
 
 
-HELD = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
+PRODUCT_COST_TEXT = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
 IN_ENGINES = {"exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
 TABLE = {
     "contact_damping": _of_parameters(
@@ -98,14 +98,14 @@ TABLE = {
     "primary_dampers": _of_parameters(
         "Dampers that hold the axle to its frame",
         ("damping_x", "damping_y", "damping_z"),
-        HELD,
+        PRODUCT_COST_TEXT,
         {"dampers": 3},
         in_engines=IN_ENGINES,
     ),
     "primary_springs": _of_parameters(
         "Springs that hold the axle to its frame",
         ("stiffness_x", "stiffness_y", "stiffness_z"),
-        HELD,
+        PRODUCT_COST_TEXT,
         {"springs": 3},
         in_engines=IN_ENGINES,
     ),
