@@ -36,8 +36,8 @@ ORDER, KINKED = 4, 2.0
 """Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
 OF_CELLS = 1.5
 """Order that is taken for the cells to use; their error falls with the first to the second power."""
-SHORT = 0.1
-"""Share of the path that half the step repeats where twice the step cannot be."""
+SHORT, LEAST_STEPS = 0.1, 20
+"""Share of the path that half the step repeats where twice the step cannot be, and its steps at least."""
 FEWEST = 5
 """Cells from which on half of them are a net."""
 March = Callable[[WheelsetScene], WheelsetPath]
@@ -74,9 +74,11 @@ def series(path: WheelsetPath) -> Series:
 
 def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
     """The scene with a step that is ``times`` as long, over a share of its path (whole steps), and with another number
-    of cells.
+    of cells. Raises RunFailed for a step that outlasts the path.
     """
     step = times * scene.run.step
+    if step > scene.run.duration * (1.0 + 1e-9):
+        raise RunFailed("", f"a step of {step:g} s outlasts the path of {scene.run.duration:g} s")
     duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
     contact = scene.contact if cells is None else scene.contact.model_copy(update={"cells": cells})
     run = scene.run.model_copy(update={"step": step, "duration": duration})
@@ -96,7 +98,8 @@ def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) 
     try:
         part, share, remains = series(march(changed(scene, 2.0, FINE_WINDOW))), FINE_WINDOW, 1.0 / (power - 1.0)
     except (InputError, RunFailed):
-        part, share, remains = series(march(changed(scene, 0.5, SHORT))), SHORT, power / (power - 1.0)
+        share = min(1.0, max(SHORT, LEAST_STEPS * scene.run.step / scene.run.duration))
+        part, remains = series(march(changed(scene, 0.5, share))), power / (power - 1.0)
     end, told = share * scene.run.duration, {}
     for name, unit in UNITS.items():
         before, whole = _gap(fine, coarse, name, end), _gap(fine, coarse, name)
