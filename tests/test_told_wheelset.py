@@ -103,7 +103,7 @@ def test_a_truth_on_ten_times_the_cells_is_within_what_is_told():
 @pytest.mark.parametrize("steps", [1, 2, 3])
 @pytest.mark.parametrize("law", [{"law": "linear"}, {"cells": 21}])
 def test_a_path_of_few_steps_is_compared_at_its_own_times(steps, law):
-    """Twice the step outlasts a path of one: its end beside this one's was taken for an error, or its start for none."""
+    """Twice the step outlasts a path of one: its end beside this one's was taken for an error, its start for none."""
     table = {"contact": law, "run": {"duration": round(steps * 5e-4, 9), "displacement": 3e-3}}
     told = errors_of(run(scene(**table), "mujoco", error=True))["y"].error
     finer = scene(**{**table, "run": {**table["run"], "step": 1.25e-4}})

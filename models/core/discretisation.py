@@ -24,8 +24,8 @@ WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
 WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
 FEW_ROWS = 1000
-"""Rows up to which all of a run is repeated in half of its step: that takes little, and a part of few rows may leave out
-what makes the error, such as a turn of the steering at the start."""
+"""Rows up to which all of a run is repeated in half of its step: that takes little, and a part of few rows may leave
+out what makes the error, such as a turn of the steering at the start."""
 STEEPEST = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
