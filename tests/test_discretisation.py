@@ -19,6 +19,7 @@ from models.core.discretisation import (
     not_estimated,
     of_chance,
     rows_at,
+    stated,
 )
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
@@ -124,6 +125,11 @@ def test_what_rests_has_no_error_and_no_warning():
 
     (one,) = errors_of(estimated(run_of(rests(1.0, 1.0)), rests(1.0, 1.0), rests, 4, STEP)).values()
     assert one.share == 0.0 and not one.warned
+
+
+def test_a_run_in_which_nothing_changes_says_so():
+    run = run_of(marched(STEP, 4, 0.0))
+    assert error_lines(stated(run, {}, "runs in longer steps")) == ["error not estimated: none of its channels changes"]
 
 
 def test_reasons_and_chance_are_told():

@@ -112,6 +112,14 @@ def test_a_path_of_few_steps_is_compared_at_its_own_times(steps, law):
     assert true / 3.0 < told < 100.0 * true  # of cells: the order of kinks is taken for that of the first steps
 
 
+@pytest.mark.parametrize("law", [{"law": "linear"}, {"cells": 11}])
+def test_a_wheelset_that_stays_in_the_middle_is_an_answer(law):
+    """Its motion is rounding, and cells by which rounding differs are not too few."""
+    centred = run(scene(contact=law, run={"duration": 0.02, "displacement": 0.0}), "mujoco", error=True)
+    told = {name: each for name, each in errors_of(centred).items() if name.startswith("y")}
+    assert np.abs(centred["y"]).max() < 1e-12 and told and not any(each.warned for each in told.values())
+
+
 def test_an_estimate_that_leaves_the_cells_out_would_be_caught():
     """Planted fault: steps alone tell less than a tenth of what a path on few cells errs by."""
     result = run(scene(), "reference", error=True)

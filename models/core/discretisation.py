@@ -30,6 +30,7 @@ STEEPEST = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
+NOTHING = "none of its channels changes"
 CELLS = "cells along each axis"
 """What an estimate is of that a coarser grid told."""
 FALL, FLOOR = 0.6, 0.03
@@ -297,6 +298,8 @@ def stated(run: Result, estimates: Mapping[str, Estimate], method: str, step_uni
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
+    if not estimates:
+        return not_estimated(run, NOTHING)
     channels = {name: asdict(estimate) for name, estimate in estimates.items()}
     run.data.attrs["error"] = json.dumps({"how": method, "of": step_unit, "channels": channels})
     worst = max(estimates, key=lambda name: estimates[name].share, default=None)

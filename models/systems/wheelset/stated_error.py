@@ -32,6 +32,8 @@ from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
 
 UNITS = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
 """Channels whose error is told; forces are the sum over the patches of a wheel."""
+STILL = 1e-12
+"""m, rad, and share of the load: a channel of a centred wheelset that is smaller is rounding, and no share is of it."""
 ORDER, KINKED = 4, 2.0
 """Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
 OF_CELLS = 1.5
@@ -49,18 +51,21 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     answer.
     """
     fine, step = series(run.detail), scene.run.step
+    sizes = _sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
     if scene.contact.law == "linear":
-        return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
+        return estimated(
+            run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step, sizes=sizes
+        )
     cells = scene.contact.cells
     other = coarser_cells(cells) if cells >= FEWEST else 2 * cells
     try:
         coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other} cells the path fails: {failure}")
-    told = _of_steps(scene, march, fine, coarse)
+    told = _of_steps(scene, march, fine, coarse, sizes)
     for name, unit in UNITS.items():
         gap = _gap(fine, coarse, name)
-        told[f"{name} of cells"] = by_cells(gap, size_of(fine.channels[name]), unit, cells, OF_CELLS, MOST_CELLS)
+        told[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
     return stated(run, told, f"a path on {other} cells and some steps of other length")
 
 
@@ -70,6 +75,14 @@ def series(path: WheelsetPath) -> Series:
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
     }
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
+
+
+def _sizes(fine: Series, load: float) -> dict[str, float]:
+    """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
+    return {
+        name: max(size_of(values), STILL * (load if UNITS[name] == "N" else 1.0))
+        for name, values in fine.channels.items()
+    }
 
 
 def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
@@ -92,7 +105,9 @@ def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
     return series(march(changed(scene, 1.0, cells=cells)))
 
 
-def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
+def _of_steps(
+    scene: WheelsetScene, march: March, fine: Series, coarse: Series, sizes: Mapping[str, float]
+) -> dict[str, Estimate]:
     """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
     power = 2.0**KINKED
     try:
@@ -104,8 +119,8 @@ def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) 
     for name, unit in UNITS.items():
         before, whole = _gap(fine, coarse, name, end), _gap(fine, coarse, name)
         grown = max(1.0, whole / before) if before > 0.0 else 1.0
-        error, size = remains * grown * _gap(fine, part, name), size_of(fine.channels[name])
-        told[name] = Estimate(error, unit, error / size if size > 0.0 else 0.0, KINKED, scene.run.step)
+        error = remains * grown * _gap(fine, part, name)
+        told[name] = Estimate(error, unit, error / sizes[name], KINKED, scene.run.step)
     return told
 
 
