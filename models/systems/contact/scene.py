@@ -188,7 +188,7 @@ def scene_errors(scene: ContactScene) -> Iterator[None]:
     except InputError as error:
         if error.file:
             raise
-        tables = {"profiles": Profiles, "contact": Contact}
+        tables: dict[str, type[Strict]] = {"profiles": Profiles, "contact": Contact}
         within = next((f"{name}." for name, keys in tables.items() if error.place in keys.model_fields), "")
         raise InputError(scene.file, f"{within}{error.place}", error.value, error.allowed, error.choices) from None
 
