@@ -23,7 +23,7 @@ WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
 """Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
 WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
-FEW_ROWS = 1000
+FEW_ROWS = 200
 """Rows up to which all of a run is repeated in half of its step: that takes little, and a part of few rows may leave
 out what makes the error, such as a turn of the steering at the start."""
 STEEPEST = 4.0
