@@ -149,6 +149,11 @@ def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
     with pytest.raises(InputError, match=r"run\.substeps = 1: must be at least 2: .* rocks up"):
         vehicle_and_start(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
     vehicle_and_start(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
+    lags["relaxation"]["front"] = 1e-12
+    with pytest.raises(InputError, match=r"relaxation = 1e-12: must be at least .* m: .* more than 1000") as refusal:
+        vehicle_and_start(scene(run={"sample": 0.01}, **lags), "stop")
+    lags["relaxation"]["front"] = float(re.search(r"at least (\S+) m", str(refusal.value))[1])
+    vehicle_and_start(scene(run={"sample": 0.01, "substeps": 1000}, **lags), "stop")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():

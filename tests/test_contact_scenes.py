@@ -65,6 +65,19 @@ def test_a_mistake_is_one_message_and_touches_nothing(twinrig, change, words, ca
     assert [path.name for path in Path().iterdir()] == ["c.toml"]
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("profiles.lateral_shift=0.05", "profiles.lateral_shift = 0.05: must be a shift in m from -0.03 to 0.03"),
+        ("profiles.lateral_shift=0.005", "method.name = 'exact': does not take patches"),
+        ("contact.load=1e-9", "method.name = 'exact': finds no grid that holds the area of a load of 1e-09 N"),
+    ],
+)
+def test_profiles_that_cannot_be_pressed_name_the_scene_and_its_key(twinrig, change, words, capsys):
+    assert twinrig("run", "contact_profiles", "--set", change, "--set", "method.cells=15") == 2
+    assert f"twinrig: contact_profiles.toml with --set: {words}" in capsys.readouterr().err
+
+
 def refused(**tables):
     with pytest.raises(InputError) as found:
         build({**TABLE, **tables}, "c.toml")

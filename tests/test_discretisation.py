@@ -19,6 +19,7 @@ from models.core.discretisation import (
     not_estimated,
     of_chance,
     rows_at,
+    with_stated_errors,
 )
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
@@ -102,6 +103,21 @@ def test_where_no_longer_step_can_be_half_of_it_tells():
     assert one.error == pytest.approx(STEP**2 * math.sqrt(0.5), rel=0.15)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3, 4, 5, 7])
+def test_longer_steps_that_outlast_a_run_tell_nothing(steps):
+    """A rerun of at least one step, as engines make it, lies beyond a run of one: half the step tells instead."""
+
+    def heave(factor: float, share: float) -> Series:
+        times = factor * STEP * np.arange(max(1, math.floor(share * steps / factor + 1e-9)) + 1)
+        return Series(times, {"heave": (1.0 + times + STEP**2 * factor**2 * times)[:, None]})
+
+    fine = heave(1.0, 1.0)
+    channels = {"heave": Channel(("time", "place"), fine.channels["heave"], "m")}
+    made = result(Scene(), channels, {"time": Channel("time", fine.times, "s")}, engine="reference")
+    (one,) = errors_of(estimated(made, fine, heave, 2, STEP)).values()
+    assert one.error == pytest.approx(STEP**2 * math.sqrt(np.mean(fine.times**2)), rel=0.5)
+
+
 def test_what_rests_has_no_error_and_no_warning():
     def rests(factor: float, share: float) -> Series:
         times = factor * STEP * np.arange(round(share * DURATION / (factor * STEP)) + 1)
@@ -109,6 +125,13 @@ def test_what_rests_has_no_error_and_no_warning():
 
     (one,) = errors_of(estimated(run_of(rests(1.0, 1.0)), rests(1.0, 1.0), rests, 4, STEP)).values()
     assert one.share == 0.0 and not one.warned
+
+
+def test_a_run_in_which_nothing_changes_says_so():
+    run = run_of(marched(STEP, 4, 0.0))
+    assert error_lines(with_stated_errors(run, {}, "runs in longer steps")) == [
+        "error not estimated: none of its channels changes"
+    ]
 
 
 def test_reasons_and_chance_are_told():

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.errors import InputError
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
 from models.core.systems import load
 from models.core.tables import write_table
 from models.identification.bands import error_bands, error_model
@@ -14,7 +15,9 @@ from models.identification.fit import fit
 from models.identification.of_scene import parameter_of_scene, problem_of
 from models.identification.problem import FitClock, Parameter, Problem, measured_channel
 from models.identification.uncertainty import likelihood_profile, uncertainty
+from models.measured.drive import read_drive
 from models.measured.outliers import without_outliers
+from models.systems.single_track import run as single_track
 from models.systems.single_track.run import run
 from models.systems.single_track.scene import SingleTrackScene, build
 from models.systems.wheelset import run as wheelset_run
@@ -52,6 +55,33 @@ def scene(tmp_path: Path) -> SingleTrackScene:
     speed = 20.0 + 3.0 * np.sin(0.4 * TIMES)
     write_table(tmp_path / "drive.csv", {"time": ("s", TIMES), "steer": ("rad", steer()), "speed": ("m/s", speed)})
     return build(table(), "car.toml", tmp_path)
+
+
+@pytest.mark.parametrize("stiffer", [1.0, 5.0, 20.0])
+def test_a_drive_tells_the_error_of_its_steps_between_samples(scene, stiffer):
+    """Within 3 of the difference from 16 times as many steps with the inputs straight between the samples."""
+    changes = {axle: {**table()[axle], "stiffness": stiffer * table()[axle]["stiffness"]} for axle in ("front", "rear")}
+    stiff = build(table(**changes), "car.toml", scene.folder)
+    driven, true = run(stiff, error=True), single_track._sensed_in_parts(stiff, *_given(stiff), 16)
+    assert set(errors_of(driven)) == set(true)
+    for name, estimate in errors_of(driven).items():
+        off = float(np.sqrt(np.mean((driven[name] - true[name]) ** 2)))
+        assert off / 3.0 < estimate.error < 3.0 * off and estimate.unit == UNITS[name]
+
+
+def test_tyres_too_stiff_for_the_samples_are_refused(scene):
+    """Steps beyond the stability of Heun's method swing from side to side within the friction: nothing diverges."""
+    tyres = {axle: {"stiffness": 2000.0, "friction": 0.95} for axle in ("front", "rear")}
+    stiff = build(table(**tyres), "car.toml", scene.folder)
+    assert np.isfinite(run(stiff)["yaw rate"]).all()
+    with pytest.raises(RunFailed, match=r"no answer: .* use at most .* s between samples"):
+        run(stiff, error=True)
+
+
+def _given(scene: SingleTrackScene) -> tuple[np.ndarray, float]:
+    """Inputs of a scene's drive, and the period (s) of its samples."""
+    drive = read_drive(scene.path(scene.drive.file))
+    return single_track.inputs(drive, scene), float(drive.times[1] - drive.times[0])
 
 
 def measured(scene: SingleTrackScene, seed: int = 1) -> Path:

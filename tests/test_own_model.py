@@ -542,6 +542,27 @@ def test_nothing_outside_is_read_by_an_include_within_an_include(tmp_path, kind)
         read(main)
 
 
+MESH = (
+    '<mujoco>{}<asset><mesh name="m" file="{}"/></asset><worldbody><body><joint/><geom type="mesh" mesh="m" '
+    'contype="0" conaffinity="0"/></body></worldbody></mujoco>'
+)
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    "compiler,name",
+    [("", "../m.obj"), ("", "{}/m.obj"), ('<compiler meshdir="{}"/>', "m.obj"), ('<compiler assetdir=".."/>', "m.obj")],
+)
+def test_no_mesh_is_read_from_outside(tmp_path, compiler, name):
+    """Neither by a way up, nor by a whole path, nor by a folder of the compiler; one beside the model is read."""
+    (tmp_path / "in").mkdir()
+    for folder in (tmp_path, tmp_path / "in"):
+        (folder / "m.obj").write_text(CORNERS)
+    with pytest.raises(InputError, match=r"a\.xml: line 1 = .*m\.obj.*<mesh> must name a file in the folder"):
+        _read(tmp_path / "in", MESH.format(compiler.format(tmp_path), name.format(tmp_path)))
+    assert _read(tmp_path / "in", MESH.format("", "m.obj")).twin.size == 1
+
+
 def test_includes_are_looked_for_where_mujoco_does(tmp_path):
     """Those of a model in its folder, those of an attached model in that one's: the plugin of either is seen."""
     plugin, sound = '<mujoco><extension><plugin plugin="x"/></extension></mujoco>', "<mujoco/>"
@@ -558,7 +579,8 @@ def test_includes_are_looked_for_where_mujoco_does(tmp_path):
     "text,old,new,said",
     [
         (LINKED, 'anchor=".6 0 0"', 'anchor="nan 0 0"', "eq_data: must be finite"),
-        (JOINTED, 'stiffness="2"', 'stiffness="nan"', "jnt_stiffness: must be finite"),
+        (JOINTED, 'stiffness="2"', 'stiffness="nan"', "joint 'hinge': jnt_stiffness: must be finite"),
+        (JOINTED, 'axis="1 2 3"', 'axis="1 nan 3"', "joint 'hinge': jnt_axis: must be finite"),
         (JOINTED, 'gear="3"', 'gear="nan"', "actuator_gear: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'gravity="nan 2 -9"', "gravity: must be finite"),
         (JOINTED, 'gravity="1 2 -9"', 'timestep="0"', "timestep = 0.0: must be a finite number above 0"),
@@ -619,6 +641,16 @@ def test_elements_have_names_units_and_values(tmp_path):
     assert listed["armature", "joint 'hinge'"].unit == "kg m^2"
     assert listed["damping", "joint 'slide'"].unit == "N s/m"
     assert np.allclose(listed["inertia", "body 'arm'"].value, (0.3, 0.4, 0.5, 0.02, 0.03, 0.04))
+
+
+def test_joints_that_move_without_inertia_are_named(tmp_path, capfd):
+    joints = "".join(
+        f'<joint name="{name}" type="slide" axis="{axis}"/>' for name, axis in (("x", "1 0 0"), ("y", "1 0 0"))
+    )
+    text = f"<mujoco><worldbody><body>{joints}<geom size='.1' pos='0 0 .1' mass='1'/></body></worldbody></mujoco>"
+    with pytest.raises(RunFailed, match="singular: joint 'x' and joint 'y' can move without inertia"):
+        certificate(_read(tmp_path, text).twin, 3)
+    assert capfd.readouterr() == ("", "")  # MuJoCo's own warnings
 
 
 def test_a_mass_that_no_force_moves_is_no_silent_difference(tmp_path):

@@ -91,6 +91,17 @@ def test_rounding_of_what_constraints_stop_is_no_difference(tmp_path, anchor):
     assert not any(row.alike for row in certificate(replace(twin, driven=heavier), 5))
 
 
+def test_forces_that_cancel_on_an_axis_leave_rounding_that_is_no_difference(tmp_path):
+    """Pendulums without weight: what pulls them towards their axles has no moment, whatever their numbers are."""
+    mass = '<inertial pos="0 .02 .1" mass="3" diaginertia=".1 .2 .25"/>'
+    text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="a" axis="0 1 0"/>{mass}</body>
+    <body pos="0 1 0"><joint name="b" axis="1 2 3" damping="1e-6"/>{mass}</body></worldbody></mujoco>"""
+    twin = _read(tmp_path, text).twin
+    assert all(row.alike for row in certificate(twin, 100))
+    other = _read(tmp_path, text.replace('"1e-6"', '"1.000001e-6"'), "b.xml").twin
+    assert [each.owner for each in compare(twin, other, 5).influential] == ["joint 'b'"]
+
+
 def test_solving_rounds_a_light_coordinate_only_where_the_mass_matrix_couples_it():
     """The second coordinate accelerates a million times as much; by hand |M^-1| |M| |a|."""
     none, acceleration = np.zeros(2), np.array([1.0, 1e6])

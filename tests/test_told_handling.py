@@ -87,6 +87,16 @@ def test_the_error_that_is_told_is_that_of_steps_and_cells(step, cells):
     assert errors_of(told)[worst].unit in ("N", "m/s", "rad/s")
 
 
+@pytest.mark.parametrize("steps", [1, 2, 5, 7])
+@pytest.mark.parametrize("engine", ["mujoco", "exudyn", "reference"])
+def test_a_manoeuvre_of_few_steps_tells_the_error_of_its_start(steps, engine):
+    """Twice the step outlasts one step, and is too long for five: a part from the middle would miss the steering."""
+    steered = {"duration": round(steps * 1e-3, 9), "steer": [[0.0, 0.0], [0.002, 0.02]]}
+    told = errors_of(run(scene(**steered), engine, error=True))["fy"].error
+    drives = [principal_series(run(scene(step, **steered), engine).detail).channels["fy"] for step in (1e-3, 2.5e-4)]
+    assert told > float(np.sqrt(np.mean((drives[0] - drives[1][::4]) ** 2))) / 3.0
+
+
 def test_an_estimate_without_the_net_would_be_caught(monkeypatch):
     """Planted fault: steps alone tell a thousandth of what the net errs by."""
     own = scene(1e-3, 7, steer=[[0.05, 0.0], [0.4, 0.05]], duration=0.4)

@@ -215,10 +215,12 @@ def test_forces_whose_steps_cannot_be_longer_are_told_by_shorter_ones(files):
 def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
     """Planted fault: what the first part shows is taken for the whole run, while the error grows as a drift does."""
 
+    step = 0.002  # s: so many rows that a part of them is repeated
+
     def drifting(factor: float, share: float = 1.0) -> Series:
         if factor > 1.0:
             raise RunFailed("reference", "no longer step can be")
-        times = 0.01 * factor * np.arange(round(share * 4.0 / (0.01 * factor)) + 1)
+        times = step * factor * np.arange(round(share * 4.0 / (step * factor)) + 1)
         return Series(times, {"z3": np.sin(5.0 * times) + 1e-3 * factor**2 * times**2})
 
     fine = drifting(1.0)
@@ -226,9 +228,19 @@ def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
         scene(), {"z3": Channel("time", fine.channels["z3"], "m")}, {"time": Channel("time", fine.times, "s")}
     )
     true = 1e-3 * float(np.sqrt(np.mean(fine.times**4)))
-    assert errors_of(estimated(made, fine, drifting, 2, 0.01))["z3"].error == pytest.approx(true, rel=0.3)
+    assert errors_of(estimated(made, fine, drifting, 2, step))["z3"].error == pytest.approx(true, rel=0.3)
     monkeypatch.setattr(discretisation, "_growth_after_window", lambda gap, values: 1.0)
-    assert errors_of(estimated(made, fine, drifting, 2, 0.01))["z3"].error < true / 3.0
+    assert errors_of(estimated(made, fine, drifting, 2, step))["z3"].error < true / 3.0
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 5])
+def test_a_run_of_few_steps_is_compared_at_its_own_times(steps):
+    """Twice the step of a run of one would outlast it, and tell the road's rise beside its foot for an error."""
+    made = run(scene(duration=steps * 1e-3, start={"z3": -0.1}), "mujoco", error=True)
+    truth = run(scene(duration=steps * 1e-3, step=1e-3 / 8, start={"z3": -0.1}), "mujoco")
+    for name in ("z3", "f3"):
+        true = float(np.sqrt(np.mean((made[name] - truth[name][::8]) ** 2)))
+        assert true / 3.0 < errors_of(made)[name].error < 30.0 * true  # the order of a few steps is not seen
 
 
 def test_a_refused_run_names_a_step_that_is_then_accepted():

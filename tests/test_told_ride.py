@@ -133,6 +133,21 @@ def test_rounding_of_a_covariance_is_told(engine):
     assert max(of_rounding(engine)) < 3.0  # every channel, as asked of the worst one
 
 
+@pytest.mark.parametrize("lasting", [1e-6, 1e-3, 5e-3, 0.01, 0.02])
+def test_a_drive_of_few_steps_has_its_error_or_a_reason(lasting):
+    """And one whose deviations hardly change is not told that they err by much of their change."""
+    made = run(scene(drive={"time": [0.0, lasting], "speed": [20.0, 20.0 + lasting]}), error=True)
+    assert errors_of(made) or "one step long" in discretisation.error_lines(made)[0]
+    assert not any(each.warned for each in errors_of(made).values())
+
+
+def test_what_stands_still_on_equal_tracks_is_no_alarm():
+    """Roll of a symmetric car is rounding there: no share of it is told as an error of 200 %."""
+    made = run(scene("r19_ride", road={"level": 1.6e-5, "left_right": "equal"}), "reference", error=True)
+    told_roll = errors_of(made)["roll acceleration"]
+    assert not any(each.warned for each in errors_of(made).values()) and 0.0 < told_roll.error < 1e-12  # rad/s^2
+
+
 def test_an_estimate_that_is_too_small_is_caught(monkeypatch):
     monkeypatch.setattr(errors, "SAFETY_FACTOR", 1e-3)
     monkeypatch.setattr(errors, "MATRIX_ACCURACY", 1e-19)

@@ -100,6 +100,26 @@ def test_a_truth_on_ten_times_the_cells_is_within_what_is_told():
     assert (ratios < 3.0).mean() > 0.85 and (ratios > 0.1).mean() > 0.85
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3])
+@pytest.mark.parametrize("law", [{"law": "linear"}, {"cells": 21}])
+def test_a_path_of_few_steps_is_compared_at_its_own_times(steps, law):
+    """Twice the step outlasts a path of one: its end beside this one's was taken for an error, its start for none."""
+    table = {"contact": law, "run": {"duration": round(steps * 5e-4, 9), "displacement": 3e-3}}
+    told = errors_of(run(scene(**table), "mujoco", error=True))["y"].error
+    finer = scene(**{**table, "run": {**table["run"], "step": 1.25e-4}})
+    fine, finer = (principal_series(run(each, "mujoco").detail).channels["y"] for each in (scene(**table), finer))
+    true = float(np.sqrt(np.mean((fine - finer[::4]) ** 2)))
+    assert true / 3.0 < told < 100.0 * true  # of cells: the order of kinks is taken for that of the first steps
+
+
+@pytest.mark.parametrize("law", [{"law": "linear"}, {"cells": 11}])
+def test_a_wheelset_that_stays_in_the_middle_is_an_answer(law):
+    """Its motion is rounding, and cells by which rounding differs are not too few."""
+    centred = run(scene(contact=law, run={"duration": 0.02, "displacement": 0.0}), "mujoco", error=True)
+    told = {name: each for name, each in errors_of(centred).items() if name.startswith("y")}
+    assert np.abs(centred["y"]).max() < 1e-12 and told and not any(each.warned for each in told.values())
+
+
 def test_an_estimate_that_leaves_the_cells_out_would_be_caught():
     """Planted fault: steps alone tell less than a tenth of what a path on few cells errs by."""
     result = run(scene(), "reference", error=True)

@@ -220,10 +220,11 @@ def _solved(patch: PatchPressure, cells: int, material_pair: MaterialPair) -> No
         inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
         try:
             return replace(solve_normal(known.at(*inside), dx, dy, material_pair, load=patch.load), x=x, y=y)
-        except InputError as error:  # the contact reaches the edge of the grid
-            refused = error
+        except InputError:  # the contact reaches the edge of the grid
+            continue
     if not any(patch.patch.cut):
-        raise refused
+        allowed = f"finds no grid that holds the area of a load of {patch.load:.3g} N: use simplified, or another load"
+        raise InputError("", "method.name", "exact", allowed)
     allowed = (
         "does not take patches of wheel and rail that have grown together: use simplified, a smaller load or "
         "another lateral_shift"

@@ -23,10 +23,14 @@ WARNED_SHARE, REFUSED_SHARE, GOAL_SHARE = 0.02, 0.5, 0.005
 """Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
 REPEATED_SHARE, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
+FEW_ROWS = 200
+"""Rows up to which all of a run is repeated in half of its step: that takes little, and a part of few rows may leave
+out what makes the error, such as a turn of the steering at the start."""
 STEEPEST_ERROR_GROWTH = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
+NOTHING = "none of its channels changes"
 CELLS_NOTE = "cells along each axis"
 """What an estimate is of that a coarser grid told."""
 TOLERANCE_POWER, LEAST_TOLERANCE_SHARE = 0.6, 0.03
@@ -128,8 +132,8 @@ class Series(NamedTuple):
 
 
 Rerun = Callable[[float, float], Series]
-"""The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer;
-raises InputError or RunFailed where that cannot be."""
+"""The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer
+or the share is 1; raises InputError or RunFailed where that cannot be."""
 
 
 def estimated(
@@ -178,10 +182,10 @@ def by_steps(
 
 
 def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> dict[str, Estimate]:
-    coarse = rerun(2.0, 1.0)
+    coarse = _within(fine, rerun(2.0, 1.0), step)
     coarser: Mapping[str, np.ndarray] = {}
     with suppress(InputError, RunFailed):
-        coarser = rerun(4.0, REPEATED_SHARE).channels
+        coarser = _within(coarse, rerun(4.0, REPEATED_SHARE), step).channels
     rows = rows_at(fine.times, coarse.times)
     return {
         name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
@@ -189,12 +193,22 @@ def _by_longer_steps(fine: Series, rerun: Rerun, order: float, step: float) -> d
     }
 
 
+def _within(fine: Series, coarse: Series, step: float) -> Series:
+    """The run in longer steps; RunFailed where it has no row after its start that a row of the finer run is near to.
+
+    Steps of a short run, twice as long, may outlast it: nothing is there to compare.
+    """
+    if len(coarse.times) < 2 or coarse.times[-1] > fine.times[-1] + 0.25 * step:
+        raise RunFailed("", f"longer steps than {step:g} s do not fit into the run")
+    return coarse
+
+
 def _by_half_steps(
     fine: Series, rerun: Rerun, order: float, step: float, growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
-    """Estimates from part of the run repeated with half the step. The error found there is scaled to the run's own step
-    by the order of the method, and to the rest of the run by its growth."""
-    finer = rerun(0.5, FINE_WINDOW)
+    """Estimates from part of the run, or all of a short one, repeated with half the step. The error found there is
+    scaled to the run's own step by the order of the method, and to the rest of the run by its growth."""
+    finer = rerun(0.5, FINE_WINDOW if len(fine.times) > FEW_ROWS else 1.0)
     slack = 1e-9 * finer.times[-1]
     part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
     rows = rows_at(finer.times, fine.times[part])
@@ -292,6 +306,8 @@ def with_stated_errors(run: Result, estimates: Mapping[str, Estimate], method: s
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
+    if not estimates:
+        return not_estimated(run, NOTHING)
     channels = {name: asdict(estimate) for name, estimate in estimates.items()}
     run.data.attrs["error"] = json.dumps({"how": method, "of": step_unit, "channels": channels})
     worst = max(estimates, key=lambda name: estimates[name].share, default=None)

@@ -30,12 +30,14 @@ def low_passed(values: np.ndarray, period: float, bandwidth: float, file: str, p
             f"must be below {fastest:g} Hz, half the sampling rate of the file: faster motion is not in it",
         )
     if not bandwidth * length >= LEAST_PERIODS * (1 - 1e-9):
+        least, lasting = LEAST_PERIODS / length, f"the samples must last {LEAST_PERIODS / bandwidth:.3g} s"
+        allowed = f"must be at least {least:.3g} Hz, or {lasting}" if least < fastest else lasting
         raise InputError(
             file,
             place,
             bandwidth,
-            f"must be at least {LEAST_PERIODS / length:.3g} Hz: of slower motion the "
-            f"{length:g} s hold no {LEAST_PERIODS:g} periods, and what is beyond their ends would be guessed",
+            f"{allowed}: of slower motion the {length:g} s hold no whole period, and what is beyond their ends would "
+            "be guessed",
         )
     padding = min(len(values) - 1, math.ceil(3 / (bandwidth * period)))
     return sosfiltfilt(butter(BUTTERWORTH_ORDER, bandwidth / fastest, output="sos"), values, axis=0, padlen=padding)

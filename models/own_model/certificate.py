@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from models.core.errors import RunFailed
+from models.engines.mujoco_quiet import without_warnings
 from models.own_model.builds import (
     ALL_BUILDS,
     PLAIN_BUILD,
@@ -43,6 +44,8 @@ SINGULAR_MASS_REASON = (
 )
 HARDLY_MOVING_SHARE = 1e-6
 """Share of the largest acceleration, weighted with the root of inertia, below which a coordinate hardly moves."""
+MOVES = 0.1
+"""Share of the largest coordinate of a motion without inertia from which a coordinate is named."""
 SMALLEST_FLOAT = float(np.finfo(float).tiny)
 RATE_FACTORS = (1.0, 3.0, 10.0)
 """Factors of random rates, of which the first is taken at which all dry friction slides."""
@@ -135,14 +138,26 @@ def reference_of_file(twin: TwinModel, states: Sequence[State], build: str) -> R
     """``Reference`` for a build from the file's own model at some states; RunFailed as in ``moved_at``."""
     law = partial(expected_equations, build=build)
     moved = moved_at(law(twin), states)
+    _check_inertia(twin, moved[0].mass)
     return Reference(twin.names, several_at_once(twin.model), moved, sensitivities(twin, law, states, moved))
+
+
+def _check_inertia(twin: TwinModel, mass: np.ndarray) -> None:
+    """RunFailed that names the joints which together move without inertia, where the mass matrix (n, n) is singular."""
+    scale = 1.0 / np.sqrt(np.maximum(mass.diagonal(), SMALLEST_FLOAT))
+    values, shapes = np.linalg.eigh(mass * np.outer(scale, scale))
+    if values[0] <= len(mass) * float(np.finfo(float).eps):
+        share = np.abs(shapes[:, 0])
+        names = [name for name, part in zip(twin.names, share, strict=True) if part > MOVES * share.max()]
+        raise RunFailed(twin.name, f"the mass matrix is singular: {' and '.join(names)} can move without inertia")
 
 
 def moved_at(move: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Moved]:
     """Mass matrix, forces and accelerations at all states; RunFailed where a mass matrix is singular or an acceleration
     is not finite."""
     try:
-        moved = [move(q, v) for q, v in states]
+        with without_warnings():  # which say less than what is raised here
+            moved = [move(q, v) for q, v in states]
     except np.linalg.LinAlgError:
         raise RunFailed("twin", SINGULAR_MASS_REASON) from None
     if not all(np.isfinite(each.acceleration).all() for each in moved):
@@ -174,12 +189,12 @@ def agreement_of_build(build: str, expected: Reference, seen: Sequence[Moved]) -
 
 
 def _may_be_rounding(own: Moved, rounding: np.ndarray) -> float:
-    """Largest ratio of the rounding (s, n) to the largest acceleration of a coordinate, 1e-10 or more; coordinates that
-    hardly move are left out."""
+    """Largest ratio of the rounding (s, n) to the largest acceleration of a coordinate, from 1e-10 to 1, which is all
+    of it; coordinates that hardly move are left out."""
     largest, allowed = own.acceleration.max(axis=0), rounding.max(axis=0)
     weighted = largest * np.sqrt(np.diagonal(own.mass, axis1=1, axis2=2).max(axis=0))
     moves = weighted > HARDLY_MOVING_SHARE * weighted.max()
-    return max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0)))
+    return min(1.0, max(EQUAL_ACCELERATION_SHARE, float((allowed[moves] / largest[moves]).max(initial=0.0))))
 
 
 def _paired_values(seen: Sequence[Moved], expected: Sequence[Moved]) -> Iterator[tuple[tuple, tuple]]:

@@ -11,11 +11,13 @@ import numpy as np
 from models.core.errors import InputError
 from models.engines.mujoco_quiet import without_warnings
 from models.own_model.content import Content, check_and_leave_out, limits_switched_off
+from models.own_model.names import label
 from models.own_model.reading import TwinModel, described_model
 from models.own_model.xml_guard import Document, checked_document
 
 NUMBERS_OF_MOTION = (
-    *("body_mass", "body_inertia", "body_pos", "body_quat", "body_gravcomp", "site_pos", "site_quat"),
+    *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_gravcomp"),
+    *("site_pos", "site_quat", "jnt_axis", "jnt_pos"),
     *("qpos0", "qpos_spring", "jnt_stiffness", "jnt_range", "dof_damping", "dof_armature", "dof_frictionloss"),
     *("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm", "eq_data", "eq_solref", "eq_solimp"),
     *("actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange"),
@@ -83,14 +85,35 @@ def check_sane(model: mujoco.MjModel, name: str) -> None:
     if not model.nv:
         raise InputError(name, "", None, "nothing in it can move: it has no joint")
     for numbers in NUMBERS_OF_MOTION:
-        values = np.asarray(getattr(model, numbers))
-        if not np.isfinite(values).all():
-            raise InputError(name, numbers, None, "must be finite numbers")
-        if values.size and np.abs(values).max() > LARGEST_NUMBER:
-            raise InputError(name, numbers, float(np.abs(values).max()), f"must be {LARGEST_NUMBER:g} or less")
+        _check_numbers(model, name, numbers)
     if not np.isfinite(model.opt.gravity).all():
         raise InputError(name, "option gravity", None, "must be finite numbers")
     if not (np.isfinite(model.opt.timestep) and model.opt.timestep > 0.0):
         raise InputError(name, "option timestep", model.opt.timestep, "must be a finite number above 0")
     if (model.dof_frictionloss < 0.0).any():
         raise InputError(name, "frictionloss", float(model.dof_frictionloss.min()), "must be 0 or more")
+
+
+def _check_numbers(model: mujoco.MjModel, name: str, numbers: str) -> None:
+    """InputError that names the part of the model of which a number is not finite, or too large."""
+    values = np.asarray(getattr(model, numbers))
+    rows = np.array([np.abs(each).max(initial=0.0) for each in values])
+    for row in np.flatnonzero(~(rows <= LARGEST_NUMBER)):
+        place = ": ".join(filter(None, (_owner(model, numbers, int(row)), numbers)))
+        if not np.isfinite(rows[row]):
+            raise InputError(name, place, None, "must be finite numbers")
+        raise InputError(name, place, float(rows[row]), f"must be {LARGEST_NUMBER:g} or less")
+
+
+OWNERS = {"jnt": "joint", "eq": "equality", "body": "body", "site": "site", "tendon": "tendon", "actuator": "actuator"}
+"""Kinds of parts of a model by what the names of their numbers begin with."""
+
+
+def _owner(model: mujoco.MjModel, numbers: str, row: int) -> str:
+    """Name of the part of the model to which a row of its numbers belongs; "" where these belong to none."""
+    prefix = numbers.partition("_")[0]
+    if prefix == "dof":
+        return label(model, "joint", int(model.dof_jntid[row]))
+    if prefix.startswith("qpos"):
+        return label(model, "joint", int(np.searchsorted(model.jnt_qposadr, row, side="right")) - 1)
+    return label(model, OWNERS[prefix], row) if prefix in OWNERS else ""

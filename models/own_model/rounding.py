@@ -8,6 +8,9 @@ coordinate has its own: a light wheel that spins up fast says nothing about a he
 matrix couples them; a stiff constraint magnifies the rounding of places; weights that a joint bears leave rounding
 where the acceleration is zero; three angles of a body mix as its axes turn. A badly conditioned mass matrix is in it.
 
+Forces of a turning body that cancel on every axis, as those towards the axle of a pendulum without weight do, stay zero
+whatever the numbers are, and leave rounding all the same: sizes of what is summed up are added (``_summed``).
+
 Solving for accelerations rounds once more, and the entries of the mass matrix independently of one another, which no
 change of the model's numbers does: that is added (``_with_solver_rounding``). Up to 100 roundings of it were seen, on a
 car.
@@ -23,6 +26,7 @@ import numpy as np
 from models.own_model.builds import Equations, Moved, State, as_parsed, forward_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import joins_bodies
+from models.own_model.names import moving_bodies
 from models.own_model.reading import TwinModel
 
 CHANGED_SHARE = 1e-9
@@ -56,11 +60,37 @@ def sensitivities(twin: TwinModel, law: Law, states: Sequence[State], moved: Seq
             for total, there, here in zip(square, other, exact, strict=True):
                 total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
     by_numbers = [
-        _with_solver_rounding(Moved(*map(np.sqrt, each)), exact) for each, exact in zip(squares, moved, strict=True)
+        _with_solver_rounding(_summed(Moved(*map(np.sqrt, square)), exact, sums), exact)
+        for square, exact, sums in zip(squares, moved, _sums_of_rates(twin, states), strict=True)
     ]
     return (
         by_numbers if not twin.driven.tied else list(map(_constrained, by_numbers, _unconstrained_motion(twin, states)))
     )
+
+
+def _summed(sensitive: Moved, moved: Moved, sums: np.ndarray) -> Moved:
+    """Sensitivities with that of summing forces of the sizes (n,) ``sums``, whatever remains of them."""
+    by_sums = np.abs(np.linalg.pinv(moved.mass)) @ sums
+    return sensitive._replace(force=sensitive.force + sums, acceleration=sensitive.acceleration + by_sums)
+
+
+def _sums_of_rates(twin: TwinModel, states: Sequence[State]) -> Iterator[np.ndarray]:
+    """For each state, sums (n,) over the bodies of the sizes of what their rates alone take on each coordinate: mass
+    times centripetal acceleration by lever, and gyroscopic moments."""
+    model, data = twin.model, mujoco.MjData(twin.model)
+    shifts, turns, shifting, turning = (np.empty((3, twin.size)) for _ in range(4))
+    for q, v in states:
+        state, sums = forward_state(twin, data, q, v), np.zeros(twin.size)
+        for b in moving_bodies(model):
+            mujoco.mj_jacBodyCom(model, data, shifts, turns, b)
+            mujoco.mj_jacDot(model, data, shifting, turning, data.xipos[b], b)
+            axes = data.ximat[b].reshape(3, 3)
+            inertia, rate = axes * model.body_inertia[b] @ axes.T, turns @ data.qvel
+            gyroscopic = np.cross(rate, inertia @ rate)
+            moment = np.linalg.norm(inertia @ (turning @ data.qvel)) + np.linalg.norm(gyroscopic)
+            force = model.body_mass[b] * np.linalg.norm(shifting @ data.qvel)
+            sums += force * np.linalg.norm(shifts, axis=0) + moment * np.linalg.norm(turns, axis=0)
+        yield np.abs(state.jacobian).T @ sums
 
 
 def _with_solver_rounding(sensitive: Moved, moved: Moved) -> Moved:

@@ -1,7 +1,7 @@
 """What a file of a model may ask of the parser, looked at before MuJoCo sees it; nothing in a file is executed.
 
-Refused, with the line: what is no XML, document types and entities, plugins, includes and attached models outside the
-file's folder, and counts that no machine could hold.
+Refused, with the line: what is no XML, document types and entities, plugins, includes, attached models, meshes and
+pictures outside the file's folder, and counts that no machine could hold.
 """
 
 from dataclasses import dataclass, field
@@ -19,6 +19,8 @@ MOST_COPIES = 2000
 """Copies that one element may ask for (replicate, composite, flexcomp): more is a mistake, or an attack."""
 FORMAT_OF_ROOT = {"mujoco": "MJCF", "mujocoinclude": "MJCF", "robot": "URDF"}
 PLUGIN_TAGS = ("plugin", "extension")
+ASSETS = {"mesh": "meshdir", "hfield": "meshdir", "texture": "texturedir", "skin": "meshdir"}
+"""Elements that name files, by the attribute of <compiler> with the folder of these files."""
 
 
 @dataclass(frozen=True)
@@ -82,16 +84,18 @@ class _Reader:
 
 class _Folders(NamedTuple):
     """Folders of included files. allowed : folder that must contain all of them; base : folder in which MuJoCo looks
-    for them, that of the model file, not of the including file; an attached model has its own."""
+    for them, that of the model file, not of the including file; an attached model has its own; elements : of the files
+    with this base."""
 
     allowed: Path
     base: Path
+    elements: list[XmlElement]
 
 
 def checked_document(path: Path) -> Document:
     """The file's elements, after checks; InputError for content that must not reach the parser."""
     folder, elements = path.resolve().parent, list[XmlElement]()
-    _read_elements(path, _Folders(folder, folder), elements, 0)
+    _read_model(path, _Folders(folder, folder, []), elements, 0)
     root = elements[0].tag
     if root not in FORMAT_OF_ROOT:
         allowed = "must be <mujoco> (MJCF) or <robot> (URDF)"
@@ -108,9 +112,16 @@ def _file_content(path: Path) -> bytes:
         raise InputError(str(path), "", None, f"cannot be read: {error.strerror or error}") from None
 
 
+def _read_model(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
+    """Read a model with all that it includes, and look where the files of its meshes and pictures lie."""
+    _read_elements(path, folders, elements, depth)
+    _check_assets(folders)
+
+
 def _read_elements(path: Path, folders: _Folders, elements: list[XmlElement], depth: int) -> None:
     for element in _Reader(path).read(_file_content(path)):
         elements.append(element)
+        folders.elements.append(element)
         place = f"line {element.line}"
         if element.tag in PLUGIN_TAGS or "plugin" in element.attributes:
             raise InputError(path.name, place, f"<{element.tag}>", "plugins are code: none is loaded")
@@ -127,8 +138,23 @@ def _read_included(path: Path, folders: _Folders, element: XmlElement, elements:
         raise InputError(path.name, place, name, f"<{element.tag}> must name a file in the folder of the model")
     if depth >= DEEPEST_INCLUDE:
         raise InputError(path.name, place, name, f"includes go {DEEPEST_INCLUDE} deep at the most")
-    base = target.parent if element.tag == "model" else folders.base
-    _read_elements(target, _Folders(folders.allowed, base), elements, depth + 1)
+    if element.tag == "model":
+        _read_model(target, _Folders(folders.allowed, target.parent, []), elements, depth + 1)
+    else:
+        _read_elements(target, folders, elements, depth + 1)
+
+
+def _check_assets(folders: _Folders) -> None:
+    """InputError for a file of a mesh or a picture outside the allowed folder, in any folder that a <compiler> says."""
+    compilers = [element.attributes for element in folders.elements if element.tag == "compiler"]
+    for element in (element for element in folders.elements if element.tag in ASSETS):
+        keys = (ASSETS[element.tag], "assetdir")
+        within = {compiler[key] for compiler in compilers for key in keys if key in compiler} or {""}
+        names = [name for key, name in element.attributes.items() if key.startswith("file")]
+        for path in (Path(folder) / name for name in names for folder in within):
+            if not (folders.base / path).resolve().is_relative_to(folders.allowed):
+                told = f"<{element.tag}> must name a file in the folder of the model"
+                raise InputError(element.file, f"line {element.line}", str(path), told)
 
 
 def _check_counts(path: Path, element: XmlElement, place: str) -> None:

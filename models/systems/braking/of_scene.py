@@ -21,7 +21,7 @@ from models.core.scene_file import parse
 from models.core.strict import read
 from models.systems.braking.march import BrakedVehicle, on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
-from models.systems.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
+from models.systems.braking.scene import MOST_SUBSTEPS, BrakeTable, BrakingScene, Procedure, Stretch
 from models.tyre.tyre_source import SCALE_BOUNDS, SURFACE_NAMES, from_file, named_tyre
 from models.tyre.tyre_table import TyreTable
 
@@ -71,6 +71,10 @@ def _check_lags(scene: BrakingScene, vehicle: BrakedVehicle, shortest: float) ->
     longest = longest_step(vehicle.slope, lively, shortest)
     if vehicle.sample / vehicle.substeps > longest:
         least = math.ceil(vehicle.sample / longest)
+        if least > MOST_SUBSTEPS:
+            length = shortest * (vehicle.sample / (MOST_SUBSTEPS * longest)) ** 2  # longest goes with its root
+            allowed = f"must be at least {1.01 * length:.2g} m: shorter ones need more than {MOST_SUBSTEPS} substeps"
+            raise InputError(scene.file, "relaxation", shortest, allowed)
         allowed = f"must be at least {least}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
         raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
 

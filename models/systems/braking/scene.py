@@ -24,6 +24,8 @@ LARGEST_TORQUE = 1e6
 """N m; no brake of one wheel gives more, by a factor of twenty."""
 LONGEST_STEP = 0.02
 """s: up to which light braking and braking from rolling were held to their closed forms."""
+MOST_SUBSTEPS = 1000
+"""Steps within a sample."""
 Procedures = Literal["straight", "split", "turn", "j_turn"]
 
 
@@ -152,7 +154,7 @@ class RunTable(Strict):
     """[run]."""
 
     sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
-    substeps: int = Field(default=4, ge=1, le=1000, description="steps of the vehicle within a sample")
+    substeps: int = Field(default=4, ge=1, le=MOST_SUBSTEPS, description="steps of the vehicle within a sample")
     forces: Literal["native", "compiled"] = Field(
         default="native",
         description="springs of what vehicle.file tows: the engine's own as far as it has them, or compiled forces",

@@ -41,7 +41,7 @@ from models.ensemble.workers import Crew, places_of
 from models.systems.contact.assumptions import assumptions
 from models.systems.contact.assumptions import table_assumptions as assumptions_of_rows
 from models.systems.contact.cases_table import answer_table, column_sizes, compile_first, kept_rows
-from models.systems.contact.scene import ContactScene
+from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
@@ -254,9 +254,11 @@ def solved_contact(scene: ContactScene) -> RollingContact:
             "has constant friction, and an effect of this scene makes it fall: use fastsim",
         )
     if scene.profiles is not None:
-        patches = [touch.patch for touch in touching_places(scene, built)]
-        pressed = press(patches, pair, load=built.load, approach=built.approach)
-        return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
+        with scene_errors(scene):
+            patches = [touch.patch for touch in touching_places(scene, built)]
+            pressed = press(patches, pair, load=built.load, approach=built.approach)
+            exact = method.name == "exact"
+            return Exact(pressed, friction, method.cells) if exact else Simplified(pressed, friction)
     hertz = hertz_of(scene)
     if method.name == "simplified":
         return Simplified(interpenetrating(hertz, pair), friction)

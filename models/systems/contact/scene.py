@@ -1,6 +1,7 @@
 """Scenes of rolling contact: two bodies, where they touch, how they roll, and by which theory they are computed."""
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
@@ -177,6 +178,19 @@ class ContactScene(SceneFile):
     def pair(self) -> MaterialPair:
         """The materials of both bodies."""
         return MaterialPair(self.bodies.wheel, self.bodies.rail)
+
+
+@contextmanager
+def scene_errors(scene: ContactScene) -> Iterator[None]:
+    """Context that turns an error without a file, of functions that know no scene, into one of the scene's key."""
+    try:
+        yield
+    except InputError as error:
+        if error.file:
+            raise
+        tables: dict[str, type[Strict]] = {"profiles": Profiles, "contact": Contact}
+        within = next((f"{name}." for name, keys in tables.items() if error.place in keys.model_fields), "")
+        raise InputError(scene.file, f"{within}{error.place}", error.value, error.allowed, error.choices) from None
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:

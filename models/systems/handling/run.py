@@ -219,20 +219,20 @@ class ManoeuvreRerun:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
         step = factor * self.step
+        if steps < 1:
+            raise RunFailed(self.engine, f"a step of {step:g} s outlasts the manoeuvre")
         return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
     def __call__(self, factor: float, share: float) -> Series:
-        """Run the manoeuvre again in twice the step, or its second half in half the step (see
+        """Run the manoeuvre again in twice the step, or a share of it in half the step (see
         ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
             raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
         if factor > 1.0:
             return self.in_double_step
         run, handling, step = self.drive.run, self.drive.handling, factor * self.step
-        first, count = (
-            round(REPEATED_PART_START * (len(run.times) - 1)),
-            max(2, round(share * (len(run.times) - 1) / factor)),
-        )
+        first = round(min(REPEATED_PART_START, 1.0 - share) * (len(run.times) - 1))
+        count = max(2, round(share * (len(run.times) - 1) / factor))
         later = _manoeuvre_from(handling, run.times[first])
         model = build(self.engine, later, Settings("RK4", step, count * step))
         path = model.run(run.positions[first], run.rates[first])

@@ -168,7 +168,7 @@ def errors_of_steps(
             raise InputError(
                 "", "run.step", tried_step, "is not taken: longer steps must divide the period of the samples"
             )
-        row = 0 if factor > 1.0 else round(REPEATED_PART_START * steps)  # a road begins gently
+        row = 0 if factor > 1.0 else round(min(REPEATED_PART_START, 1.0 - share) * steps)  # a road begins gently
         first = round(row / factor)
         inputs = hub_inputs(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]

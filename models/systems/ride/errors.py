@@ -25,6 +25,8 @@ CHECKED_SPEEDS = 3
 """Speeds of a sweep that are solved again."""
 MATRIX_ACCURACY, CORNERED_LAW_ACCURACY = 4.0 * float(np.finfo(float).eps), 1e-11
 """Relative accuracy of matrices: of formulas and of an engine's smooth laws, and of an engine's curves with corners."""
+STILL = 1e-9
+"""Share of the largest deviation of the same unit below which an output stands still, as roll does on equal tracks."""
 SAFETY_FACTOR = 2.0
 """One draw of last digits may change little by chance."""
 
@@ -60,16 +62,16 @@ def with_error_of_sweep(
         ]
     )
     deviation = swept.deviation[:, at]
-    told = {}
-    for i, (name, unit) in enumerate(zip(swept.outputs, swept.units, strict=True)):
-        known = np.isfinite(deviation[..., i]) & np.isfinite(recomputed[..., i])
-        size = finite_rms(deviation[..., i][known])
+    known = np.isfinite(deviation) & np.isfinite(recomputed)
+    sizes, told = [finite_rms(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
+    largest = {
+        unit: max(size for size, of in zip(sizes, swept.units, strict=True) if of == unit) for unit in swept.units
+    }
+    for i, (name, unit, size) in enumerate(zip(swept.outputs, swept.units, sizes, strict=True)):
         if size > 0.0:
-            error = max(
-                SAFETY_FACTOR * finite_rms(recomputed[..., i][known] - deviation[..., i][known]),
-                MATRIX_ACCURACY / 4.0 * size,
-            )
-            told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
+            changes = (recomputed - deviation)[..., i][known[..., i]]
+            error = max(SAFETY_FACTOR * finite_rms(changes), MATRIX_ACCURACY / 4.0 * size)
+            told[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return with_stated_errors(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
 

@@ -9,10 +9,12 @@ from models.core.discretisation import (
     Series,
     by_chance,
     estimated,
+    not_estimated,
     observed_order,
     of_chance,
     with_stated_errors,
 )
+from models.core.errors import RunFailed
 from models.core.result import Result
 from models.ride.nonlinear_copies import Copies, coarser_variances
 from models.ride.speed_profile import SpeedProfile
@@ -39,10 +41,13 @@ def with_error_of_drive(
     run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: DeviationsAtConstantSpeed
 ) -> Result:
     """The result with the errors of its deviations. They are estimated by the same drive in longer steps that end with
-    its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly.
+    its own, and by fewer speeds between which quasi-stationary deviations are interpolated linearly. Shares are of the
+    deviations themselves, which along an even drive do not change. A drive of one step has no estimate.
     """
     assert scene.drive is not None
     drive: VaryingSpeed = run.detail
+    if len(drive.time) < 3:
+        return not_estimated(run, "the drive is one step long, and no longer step could be beside it")
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
     shown = np.isfinite(drive.deviation).all(axis=0)
 
@@ -54,9 +59,11 @@ def with_error_of_drive(
         return Series(time, channels | apart)
 
     def rerun(times: float, share: float) -> Series:
-        every = round(times)
+        every = max(1, round(times))
         end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
         wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
+        if times < 1.0 or len(wanted) < 2:
+            raise RunFailed(str(run.data.attrs["engine"]), "the drive cannot be repeated in other steps")
         cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
             linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * LARGEST_RATE_TIMES_STEP
@@ -67,7 +74,9 @@ def with_error_of_drive(
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    return estimated(run, fine, rerun, DRIVE_ORDER, step)
+    return estimated(
+        run, fine, rerun, DRIVE_ORDER, step, sizes={name: finite_rms(each) for name, each in fine.channels.items()}
+    )
 
 
 def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:

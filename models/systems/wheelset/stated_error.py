@@ -32,12 +32,14 @@ from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
 
 UNIT_OF_CHANNEL = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
 """Channels whose error is told; forces are the sum over the patches of a wheel."""
+STILL = 1e-12
+"""m, rad, and share of the load: a channel of a centred wheelset that is smaller is rounding, and no share is of it."""
 RK4_ORDER, KINKED_ORDER = 4, 2.0
 """Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
 OF_CELLS = 1.5
 """Order that is taken for the cells to use; their error falls with the first to the second power."""
-HALF_STEP_SHARE = 0.1
-"""Share of the path that half the step repeats where twice the step cannot be."""
+HALF_STEP_SHARE, LEAST_STEPS = 0.1, 20
+"""Share of the path that half the step repeats where twice the step cannot be, and its steps at least."""
 FEWEST_CELLS = 5
 """Cells from which on half of them are a net."""
 March = Callable[[WheelsetScene], WheelsetPath]
@@ -49,6 +51,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
     answer.
     """
     fine, step = principal_series(run.detail), scene.run.step
+    sizes = _sizes(fine, float(np.abs(run.detail.contacts["load"]).max()))
     if scene.contact.law == "linear":
         return estimated(
             run,
@@ -56,6 +59,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
             lambda times, share: principal_series(march(with_step_factor(scene, times, share))),
             RK4_ORDER,
             step,
+            sizes=sizes,
         )
     cells = scene.contact.cells
     other = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
@@ -63,10 +67,10 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
         coarse = _coarse_run(scene, march, other)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"on {other} cells the path fails: {failure}")
-    told = _of_steps(scene, march, fine, coarse)
+    told = _of_steps(scene, march, fine, coarse, sizes)
     for name, unit in UNIT_OF_CHANNEL.items():
         gap = _rms_difference(fine, coarse, name)
-        told[f"{name} of cells"] = by_cells(gap, size_of(fine.channels[name]), unit, cells, OF_CELLS, MOST_CELLS)
+        told[f"{name} of cells"] = by_cells(gap, sizes[name], unit, cells, OF_CELLS, MOST_CELLS)
     return with_stated_errors(run, told, f"a path on {other} cells and some steps of other length")
 
 
@@ -78,11 +82,21 @@ def principal_series(path: WheelsetPath) -> Series:
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
+def _sizes(fine: Series, load: float) -> dict[str, float]:
+    """Sizes of the channels by which errors are divided; ``load`` : the largest of a patch (N)."""
+    return {
+        name: max(size_of(values), STILL * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
+        for name, values in fine.channels.items()
+    }
+
+
 def with_step_factor(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
     """The scene with a step that is ``times`` as long, over a share of its path (whole steps), and with another number
-    of cells.
+    of cells. Raises RunFailed for a step that outlasts the path.
     """
     step = times * scene.run.step
+    if step > scene.run.duration * (1.0 + 1e-9):
+        raise RunFailed("", f"a step of {step:g} s outlasts the path of {scene.run.duration:g} s")
     duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
     contact = scene.contact if cells is None else scene.contact.model_copy(update={"cells": cells})
     run = scene.run.model_copy(update={"step": step, "duration": duration})
@@ -96,7 +110,9 @@ def _coarse_run(scene: WheelsetScene, march: March, cells: int) -> Series:
     return principal_series(march(with_step_factor(scene, 1.0, cells=cells)))
 
 
-def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
+def _of_steps(
+    scene: WheelsetScene, march: March, fine: Series, coarse: Series, sizes: Mapping[str, float]
+) -> dict[str, Estimate]:
     """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
     power = 2.0**KINKED_ORDER
     try:
@@ -106,17 +122,14 @@ def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) 
             1.0 / (power - 1.0),
         )
     except (InputError, RunFailed):
-        part, share, remains = (
-            principal_series(march(with_step_factor(scene, 0.5, HALF_STEP_SHARE))),
-            HALF_STEP_SHARE,
-            power / (power - 1.0),
-        )
+        share = min(1.0, max(HALF_STEP_SHARE, LEAST_STEPS * scene.run.step / scene.run.duration))
+        part, remains = principal_series(march(with_step_factor(scene, 0.5, share))), power / (power - 1.0)
     end, told = share * scene.run.duration, {}
     for name, unit in UNIT_OF_CHANNEL.items():
         before, whole = _rms_difference(fine, coarse, name, end), _rms_difference(fine, coarse, name)
         grown = max(1.0, whole / before) if before > 0.0 else 1.0
-        error, size = remains * grown * _rms_difference(fine, part, name), size_of(fine.channels[name])
-        told[name] = Estimate(error, unit, error / size if size > 0.0 else 0.0, KINKED_ORDER, scene.run.step)
+        error = remains * grown * _rms_difference(fine, part, name)
+        told[name] = Estimate(error, unit, error / sizes[name], KINKED_ORDER, scene.run.step)
     return told
 
 
