@@ -181,7 +181,7 @@ def run_scene(
             module = checked_study(loaded, engines)
         if plain_arrays(loaded, engines, module):
             leave_out(*OF_LABELS)
-        folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
+        folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
         finish(telling(work), folder, as_json, doubts, strict, loaded.system)

@@ -62,7 +62,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
             scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
         )
         contacts = result.detail
-        failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
+        failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table(contacts.placed)]
         if contacts.placed:

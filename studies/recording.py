@@ -13,7 +13,7 @@ from models.systems.measured.run import WORK_FOLDER, Examination
 from models.systems.measured.run import run as run_scene
 from models.systems.measured.scene import MeasuredScene
 
-SYSTEM, BLOCKS = "measured", WORK_FOLDER
+SYSTEM, BLOCKS_FOLDER = "measured", WORK_FOLDER
 
 
 class Options(Strict):

@@ -81,7 +81,7 @@ def test_tyres_too_stiff_for_the_samples_are_refused(scene):
 def _given(scene: SingleTrackScene) -> tuple[np.ndarray, float]:
     """Inputs of a scene's drive, and the period (s) of its samples."""
     drive = read_drive(scene.path(scene.drive.file))
-    return single_track.inputs(drive, scene), float(drive.times[1] - drive.times[0])
+    return single_track.equation_inputs(drive, scene), float(drive.times[1] - drive.times[0])
 
 
 def measured(scene: SingleTrackScene, seed: int = 1) -> Path:

@@ -58,7 +58,7 @@ class Parameters(Strict):
 
 def extend(vehicle, p):
     slow = np.full(vehicle.plane.wheels, p.time)
-    return replace(vehicle, chambers=vehicle.chambers._replace(fill=slow, empty=slow))
+    return replace(vehicle, chambers=vehicle.chambers._replace(fill_time=slow, empty_time=slow))
 '''
 
 

@@ -221,7 +221,7 @@ def test_a_wrong_order_fails_its_row():
 def test_what_a_default_loses():
     """1e-3 N: first order needs 1000 times 125 calls, fourth order 1000^(1/4) times 500: 44.5 times."""
     found = measured_of(PlantedProblem()).loss(1e-3, "force calls", "exudyn first")
-    assert found.origin == "extrapolated"
+    assert found.how == "extrapolated"
     assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
     assert found.low == found.high == found.factor, "counts have no interval"
 

@@ -218,7 +218,7 @@ def test_mujoco_and_the_reference_agree_on_rails(guided, geometry, interpolation
     own = on_rails(guided, interpolation, geometry)
     one, other = (model(engine, own).run() for engine in ("reference", "mujoco"))
     assert np.abs(one.states - other.states).max() < 1e-12
-    assert np.abs(one.guiding_forces - other.guiding_forces).max() < 1e-12 * np.abs(one.guiding_forces).max()
+    assert np.abs(one.enforced - other.enforced).max() < 1e-12 * np.abs(one.enforced).max()
 
 
 def test_exudyn_multipliers_on_rails(guided):
@@ -229,7 +229,7 @@ def test_exudyn_multipliers_on_rails(guided):
         for engine, name in (("reference", "RK4"), ("exudyn", "GeneralizedAlpha"))
     )
     assert np.abs(one.states - other.states)[:, [2, 3]].max() < 1e-12  # it stays where it is put
-    off = np.abs(one.guiding_forces - other.guiding_forces)[50:].max(axis=0) / np.abs(one.guiding_forces).max(axis=0)
+    off = np.abs(one.enforced - other.enforced)[50:].max(axis=0) / np.abs(one.enforced).max(axis=0)
     assert (off < 1e-3).all()
 
 

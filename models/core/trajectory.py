@@ -10,13 +10,13 @@ class Trajectory:
     """Path of a run: times (m,) in s; states (m, 2 n): coordinates of the vehicle (m, rad), then their rates; cost in
     counts.
 
-    guiding_forces (m, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
+    enforced (m, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
     (N m, nose up); None where nothing is.
     """
 
     times: np.ndarray
     states: np.ndarray
-    guiding_forces: np.ndarray | None = None
+    enforced: np.ndarray | None = None
     counts: dict[str, int] = field(default_factory=dict)
 
     @property
@@ -32,10 +32,10 @@ class Trajectory:
     @property
     def moment(self) -> np.ndarray | None:
         """Moment (m,) in N m that enforces the prescribed pitch."""
-        return None if self.guiding_forces is None else self.guiding_forces[:, -1]
+        return None if self.enforced is None else self.enforced[:, -1]
 
     @property
     def force(self) -> np.ndarray | None:
         """Force (m,) in N, positive down, that enforces the prescribed heave; None where only the pitch is
         prescribed."""
-        return None if self.guiding_forces is None or self.guiding_forces.shape[1] < 2 else self.guiding_forces[:, 0]
+        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]

@@ -81,7 +81,7 @@ def _is_runnable(scene: Any, engine: str) -> bool:
 def plain_arrays(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
     """Whether a study can run with numpy alone: it uses no workers, no unit conversion, and no user's code."""
     code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
-    shared = hasattr(module, "BLOCKS") or scene.system == "measured"
+    shared = hasattr(module, "BLOCKS_FOLDER") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
 
 

@@ -55,9 +55,9 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
 
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
     chain = [controller]
-    while hasattr(chain[-1], "inner"):
+    while hasattr(chain[-1], "controller"):
         chain.append(chain[-1].controller)
-    last, seeing = chain[-1], [part for part in chain if hasattr(part, "teeth")]
+    last, seeing = chain[-1], [part for part in chain if hasattr(part, "tooth_counter")]
     conversions = [channels.conversion for part in seeing for channels in (part.wheels, part.pressures)]
     return {
         "coordinates": len(vehicle.coordinates),

@@ -142,11 +142,11 @@ def _force_impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
 def enforced_gap(make_engine: Make, assembly: Assembly, settings: Settings) -> float:
     """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
     path = run(make_engine, assembly, settings)
-    if path is None or path.guiding_forces is None:
+    if path is None or path.enforced is None:
         return float("inf")
-    hand = engine("reference")(assembly, by_hand(settings)).run().guiding_forces
+    hand = engine("reference")(assembly, by_hand(settings)).run().enforced
     assert hand is not None
-    return float(np.sqrt(np.mean((path.guiding_forces - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
+    return float(np.sqrt(np.mean((path.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
 
 
 def by_hand(settings: Settings) -> Settings:

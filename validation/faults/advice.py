@@ -229,7 +229,7 @@ FAULTS = (
     CampaignFault(
         "predicted error a tenth of what was measured",
         "recommendation",
-        _in_module("_resolved", _tenfold_smaller_errors),
+        _in_module("_with_finer_truth", _tenfold_smaller_errors),
     ),
     CampaignFault(
         "the most accurate setting wins, not the cheapest",
@@ -246,12 +246,17 @@ FAULTS = (
         ),
     ),
     CampaignFault(
-        "the default kept whatever it costs", "recommendation", _in_module("_slower", lambda _: lambda one, best: False)
+        "the default kept whatever it costs",
+        "recommendation",
+        _in_module("_is_slower", lambda _: lambda one, best: False),
     ),
     CampaignFault(
         "judged over the part that is searched alone",
         "recommendation",
-        _in_module("_confirmed", lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners)),
+        _in_module(
+            "_confirmed_over_whole_run",
+            lambda _: lambda search, timed, winners, _executor: (search.truth, timed, winners),
+        ),
     ),
     CampaignFault(
         "mean difference for the largest", "truth", _in_module("ReferenceTruth.error", lambda _: _mean_error, "truth")
@@ -269,7 +274,7 @@ FAULTS = (
     CampaignFault(
         "a tolerance three times too wide",
         "search",
-        _in_module("Search.held", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
+        _in_module("Search.largest_allowed_error", lambda _: property(lambda self: 3.0 * self.tolerance), "search"),
     ),
 )
 

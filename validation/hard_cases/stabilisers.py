@@ -166,10 +166,7 @@ def rough_rails(engine: str, folder: Path) -> float:
     """Case: noise of 1e-6 m and rad on prescribed heave and pitch. Error: rms change of enforced force and moment,
     divided by the finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
-    enforced, clean = (
-        _guided_run(engine, on_rails(NOISE)).guiding_forces,
-        _guided_run("reference", on_rails()).guiding_forces,
-    )
+    enforced, clean = (_guided_run(engine, on_rails(NOISE)).enforced, _guided_run("reference", on_rails()).enforced)
     assert enforced is not None and clean is not None
     sizes = np.array([p.m3, p.I]) * NOISE * np.sqrt(6) / 2.5e-4**2
     return float((np.sqrt(np.mean((enforced - clean) ** 2, axis=0)) / sizes).max())

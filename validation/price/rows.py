@@ -61,7 +61,7 @@ def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
 
 def _reference_row(problem: Problem, measured_points: MeasuredPoints) -> Row:
     """Row: the reference is more accurate than the finest tolerance requires."""
-    quantity, share = measured_points.quantity, getattr(problem, "sure", REFERENCE_SHARE)
+    quantity, share = measured_points.quantity, getattr(problem, "confirmation_divisor", REFERENCE_SHARE)
     return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,

@@ -209,8 +209,15 @@ def read(path: Path) -> Saved:
 def page_text(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
     environment = environment_of(Path(__file__).parent)
-    filters = (number_markup, error, share_markup, duration, powers_markup, docstring_markup, numeric_columns)
-    environment.filters |= {filter.__name__: filter for filter in filters}
+    environment.filters |= {
+        "number": number_markup,
+        "error": error,
+        "share": share_markup,
+        "duration": duration,
+        "powers": powers_markup,
+        "marked": docstring_markup,
+        "numeric_columns": numeric_columns,
+    }
     environment.globals |= {"margin": margin_of_row, "case_of": case_of}
     names = list(dict.fromkeys(map(case_of, results["rows"])))
     drawn = dict(zip(names, each(partial(case_on_page, data), names), strict=True))

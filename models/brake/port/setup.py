@@ -116,7 +116,9 @@ def controller_of_run(
         plain = teeth is None and table.signals == table.pressures == Conversion()
         wheels = run.radius.size
         yield (
-            faulty if plain else controller_behind_sensors(faulty, wheels, table.signals, table.pressures, teeth=teeth),
+            faulty
+            if plain
+            else controller_behind_sensors(faulty, wheels, table.signals, table.pressures, tooth_counter=teeth),
             clock,
         )
 

@@ -69,7 +69,8 @@ def with_error_of_sweep(
     }
     for i, (name, unit, size) in enumerate(zip(swept.outputs, swept.units, sizes, strict=True)):
         if size > 0.0:
-            changes = (recomputed - deviation)[..., i][known[..., i]]
+            there = known[..., i]
+            changes = recomputed[..., i][there] - deviation[..., i][there]
             error = max(SAFETY_FACTOR * finite_rms(changes), MATRIX_ACCURACY / 4.0 * size)
             told[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"

@@ -220,18 +220,15 @@ def _without_damping(scene: ReducedScene) -> ReducedScene:
 
 
 SORTS: dict[str, Callable[[ReducedScene], list[Effect]]] = {
-    find.__name__: find
-    for find in (
-        anti_roll_bars,
-        body_mass,
-        rigid_bushing_effects,
-        linear_law_effects,
-        delay_effects,
-        locked_freedom_effects,
-        rigid_mount_effects,
-        second_corner,
-        second_track,
-        tyre_damping,
-    )
+    "anti_roll_bars": anti_roll_bars,
+    "body_mass": body_mass,
+    "bushings": rigid_bushing_effects,
+    "curves": linear_law_effects,
+    "delay": delay_effects,
+    "freedoms": locked_freedom_effects,
+    "mounts": rigid_mount_effects,
+    "second_corner": second_corner,
+    "second_track": second_track,
+    "tyre_damping": tyre_damping,
 }
 """Sorts of effects by the name of their line in the table of effects."""
