@@ -182,7 +182,7 @@ class Planted:
 
 
 def same(alone: ReferenceTruth, shared: ReferenceTruth):
-    keys = ("uncertainty", "origin", "rung", "broken")
+    keys = ("uncertainty", "origin", "rung", "broken_assumptions")
     equal = np.array_equal(alone.answer.values, shared.answer.values)
     return equal and all(getattr(alone, key) == getattr(shared, key) for key in keys)
 

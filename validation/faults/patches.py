@@ -47,7 +47,9 @@ def _owner_and_name(path: str) -> tuple[Any, str]:
 
 
 def with_globals(function: Callable[..., Any], **others: Any) -> Callable[..., Any]:
-    """A copy of the function with other globals."""
+    """A copy of the function with other globals; each must be one that its file has."""
+    if unknown := others.keys() - function.__globals__.keys():
+        raise AttributeError(f"{function.__module__} has no {', '.join(sorted(unknown))}")
     return FunctionType(function.__code__, function.__globals__ | others, function.__name__)
 
 

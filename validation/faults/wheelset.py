@@ -169,7 +169,7 @@ def creep_law_patch(change: Callable[[Any, Any], None], speed: float = 1.0) -> P
         change(contacts, slip)
         wf.fill_creep_forces(contacts, slip, speed * velocity, *rest)
 
-    return plain_python_patch(creep=creep)
+    return plain_python_patch(fill_creep_forces=creep)
 
 
 def contact_point_patch(change: Callable[[Any], None]) -> Patch:
@@ -233,7 +233,7 @@ def _damped_twice(original: Any) -> Any:
 
 FAULTS = (
     CampaignFault("sign of the spin creepage", "creep law", creep_law_patch(spin_reversed)),
-    CampaignFault("sign of the spin moment", "creep law", plain_python_patch(creep=_turned_back)),
+    CampaignFault("sign of the spin moment", "creep law", plain_python_patch(fill_creep_forces=_turned_back)),
     CampaignFault("creepage by a speed 2 % off", "creep law", creep_law_patch(lambda contacts, slip: None, 1.02)),
     CampaignFault("load not distributed: both wheels have the mean", "creep law", creep_law_patch(_share_contact)),
     CampaignFault("friction 1 % off", "creep law", creep_law_patch(multiplied_field("mu", 1.01))),
