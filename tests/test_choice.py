@@ -64,7 +64,7 @@ class Made(Variants):
     """Variants whose quantity is a given function of what is left out and of the step."""
 
     def __init__(self, function, effects):
-        self.function, self.names, self.calls, self._kept, self._work_of_set, self._assumptions_broken = (
+        self.function, self.names, self.calls, self._kept, self._seconds_per_call, self._assumptions_broken = (
             function,
             effects,
             0,

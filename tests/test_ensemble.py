@@ -156,7 +156,7 @@ def test_progress_counts_paths_and_tells_the_time_left(folder):
     told = []
     run_paths(job(folder), PATHS, blocks=Blocks(BLOCK), progress=told.append)
     assert [state.done for state in told] == [0, 3, 6, 9, 10]
-    assert all(state.left == pytest.approx((10 - state.done) / state.rate) for state in told[1:])
+    assert all(state.seconds_left == pytest.approx((10 - state.done) / state.rate) for state in told[1:])
     assert str(told[-1]).startswith("10 of 10 paths")
 
 

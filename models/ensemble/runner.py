@@ -90,10 +90,10 @@ class EnsembleProgress:
     done: int
     paths: int
     rate: float
-    left: float
+    seconds_left: float
 
     def __str__(self) -> str:
-        left = f", {self.left:.0f} s left" if self.rate else ""
+        left = f", {self.seconds_left:.0f} s left" if self.rate else ""
         return f"{self.done} of {self.paths} paths, {self.rate:.3g} per second{left}"
 
 

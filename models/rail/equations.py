@@ -52,7 +52,7 @@ ALLOWED_STEP_RATE, LIMIT_OF_RK4 = 2.5, 2.785
 """Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
 DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
-FASTEST_SPEED = 200.0
+LARGEST_SPEED = 200.0
 """m/s"""
 LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
@@ -225,7 +225,7 @@ class Equations:
     def __post_init__(self) -> None:
         if self.law not in LAW_NUMBERS:
             raise InputError("", "law", self.law, "is not known", tuple(LAW_NUMBERS))
-        number("speed", self.speed, "a speed in m/s from -200 to 200", -FASTEST_SPEED, FASTEST_SPEED)
+        number("speed", self.speed, "a speed in m/s from -200 to 200", -LARGEST_SPEED, LARGEST_SPEED)
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property

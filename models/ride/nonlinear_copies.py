@@ -197,11 +197,11 @@ def _static_positions(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
 
 def _steepest_gains(spring: SpringDamper) -> Gains:
     """Largest stiffness (N/m) and damping (N s/m) of a spring's curves."""
-    travel, rate = (_slopes_at_rest(curve).max() for curve in (spring.travel_force, spring.rate_force))
+    travel, rate = (_slopes_of_pieces(curve).max() for curve in (spring.travel_force, spring.rate_force))
     return spring.stiffness + travel, spring.damping + rate + spring.friction / spring.friction_rate
 
 
-def _slopes_at_rest(curve: Curve | None) -> np.ndarray:
+def _slopes_of_pieces(curve: Curve | None) -> np.ndarray:
     if curve is None:
         return np.zeros(1)
     _, slope, _, bends = curve.hinges()

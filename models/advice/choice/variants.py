@@ -70,7 +70,7 @@ class Variants:
     system: ModuleType = field(init=False)
     calls: int = 0
     _kept: dict[VariantKey, RunQuantities | None] = field(default_factory=dict)
-    _work_of_set: dict[EffectSet, float] = field(default_factory=dict)
+    _seconds_per_call: dict[EffectSet, float] = field(default_factory=dict)
     _assumptions_broken: dict[VariantKey, dict[str, BrokenAssumption]] = field(default_factory=dict)
     _computed_in_advance: dict[VariantKey, VariantOutcome] = field(default_factory=dict)
 
@@ -175,17 +175,17 @@ class Variants:
 
     def per_call(self, omitted_effects: EffectSet) -> float:
         """CPU seconds of one call, the least of a few runs in this process; infinite where no run succeeds."""
-        if omitted_effects not in self._work_of_set:
+        if omitted_effects not in self._seconds_per_call:
             took, run = (
                 list[float](),
                 self.of(omitted_effects) if self.executor is None else self._run(omitted_effects, 1),
             )
             while run is not None and (len(took) < 2 or (len(took) < TIMED_RUNS and sum(took) < LEAST_TIMED_SECONDS)):
                 took.append(run.seconds)
-                self._work_of_set[omitted_effects] = min(took) / run.counts["calls"]
+                self._seconds_per_call[omitted_effects] = min(took) / run.counts["calls"]
                 run = self._run(omitted_effects, 1)
-            self._work_of_set.setdefault(omitted_effects, math.inf)
-        return self._work_of_set[omitted_effects]
+            self._seconds_per_call.setdefault(omitted_effects, math.inf)
+        return self._seconds_per_call[omitted_effects]
 
     def lengths(self) -> list[int]:
         """Factors by which the step may be lengthened, so that whole numbers of steps fit into the run."""

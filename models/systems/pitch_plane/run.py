@@ -118,8 +118,8 @@ def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]
 
 
 def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
-    """Sizes by which errors of the enforced moment and force are divided. They come from the chassis' inertia, as
-    moment and force may be zero.
+    """Sizes by which errors of the enforced moment and force are divided, as these may be zero: those of the chassis'
+    inertia term and of the suspension forces together.
     """
     sizes = {}
     if "enforced_moment" in channels:
