@@ -24,7 +24,7 @@ HEADINGS = {
     "as a test of each proves:",
     WHY_HARMLESS[1]: "These hand on views of what they are given, arrays that are written over, zeros, or nothing:",
 }
-"""What stands before the list of each kind of ``uncovered``."""
+"""What stands before the list of each kind of ``uncovered_functions``."""
 
 
 def counts(lines: list[Line]) -> str:

@@ -111,8 +111,8 @@ def elements_of_model(model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
 
 
 def put(model: mujoco.MjModel, key: tuple[str, str], value: np.ndarray) -> None:
-    """Write a value of an element into a model for ``described``; KeyError if the model has no such element, ValueError
-    if the element cannot have this value."""
+    """Write a value of an element into a model for ``described_model``; KeyError if the model has no such element,
+    ValueError if the element cannot have this value."""
     kind, number = _kind_and_index(model, key)
     if kind.read(model, number).shape != value.shape:
         raise ValueError(f"{kind.kind} has another number of values")

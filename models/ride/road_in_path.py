@@ -32,7 +32,7 @@ class RoadInPath:
     white noise from the road.
 
     A (n, n); inputs (n, a, m) over axles and filter states; ``basis`` turns (y, f) into the states of
-    ``excited``, weightings included; C, rate (p, n + a m).
+    ``vehicle_with_road``, weightings included; C, rate (p, n + a m).
     """
 
     A: np.ndarray

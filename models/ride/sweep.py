@@ -189,8 +189,8 @@ class ModalVariances:
 def modal_variances(
     system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: SharedModes
 ) -> ModalVariances | str:
-    """Variances of a system as built by ``excited`` and ``weighted``, or a text that says why they cannot be computed
-    here.
+    """Variances of a system as built by ``vehicle_with_road`` and ``system_with_weightings``, or a text that says why
+    they cannot be computed here.
 
     vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
     the states of weightings stand last.

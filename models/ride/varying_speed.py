@@ -41,7 +41,8 @@ class VaryingSpeed:
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
     and, while the road moves, where it holds white noise; height (N, w) of the road under each wheel, m, which may not
-    change; status (p,) of the outputs as in ``covariance``; P (n, n): covariance of the last state of ``excited``.
+    change; status (p,) of the outputs as in ``covariance``; P (n, n): covariance of the last state of
+    ``vehicle_with_road``.
     """
 
     names: tuple[str, ...]
@@ -83,7 +84,7 @@ def varying_speed(
     ----------
     weightings : weighted outputs to add, as in ``weighting.weighted``
     instants : times (s) within the drive that shall be among those of the result
-    accuracy : of the vehicle's matrices, relative, as in ``stationary``
+    accuracy : of the vehicle's matrices, relative, as in ``stationary_covariance``
     reach : fastest rate times step; the change at half of it tells the error
 
     Raises

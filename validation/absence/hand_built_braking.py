@@ -302,7 +302,7 @@ def march(now, torque, steps, step, truck, known, stop):
 
 def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], BrakingPath]:
     """A hand-written stop from a speed (m/s) with steered front wheels (rad), built from the parameters of a bare
-    vehicle (``models.systems.braking.run.Braked``). It has at most ``samples`` samples, the start included."""
+    vehicle (``models.systems.braking.march.BrakedVehicle``). It has at most ``samples`` samples, the start included."""
     plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
     truck = Truck(
         plane.place[:, 0].copy(),

@@ -22,7 +22,7 @@ Independence = Literal["native", "handed over", "shared kernel", "closed form", 
 """How far the two sides are apart: separate force laws, an engine that is handed matrices, the same force code, an
 exact answer, a published figure, what was measured on a real vehicle, or no second side."""
 Status = Literal["failed", "missed", "not run", "reported", "passed"]
-"""In the order in which they are told. ``failed_row`` and ``passed`` are judged, the same on any machine; ``missed`` is
+"""In the order in which they are told. ``failed`` and ``passed`` are judged, the same on any machine; ``missed`` is
 a stated aim that was not reached, as by seconds of a slow machine; ``reported`` stands without being judged."""
 STATUSES: tuple[Status, ...] = get_args(Status)
 Side = Literal["at most", "at least"]

@@ -123,7 +123,9 @@ class Chooser(Candidates):
 
     @cached_in_object
     def _cost_by_run(self, omitted_effects: EffectSet) -> Cost:
-        """Cost as from ``accurate``, in a step that a run at the middle one of the screened speeds confirms."""
+        """Cost as from ``cost_at_equal_accuracy``, in a step that a run at the middle one of the screened speeds
+        confirms.
+        """
         step, marches = self.cost_at_equal_accuracy(omitted_effects).step, self.marches(omitted_effects)
         while step and not confirms_step(marches[len(marches) // 2], step):
             step *= STEP_FACTOR

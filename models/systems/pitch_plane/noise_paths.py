@@ -8,7 +8,7 @@ noise.
 MuJoCo computes them in its own threads, too. Its callbacks are global to a process, so its runs cannot each bring their
 own into several Python threads: the compiled callback is installed once and ``rollout`` shares the models, each of
 which holds its path's forces as a table, among its threads. Exudyn, and anything else, runs in processes:
-``noise_paths(..., engine="exudyn")`` on ``workers.processes``.
+``noise_paths(..., engine="exudyn")`` on ``workers.process_pool``.
 """
 
 import math

@@ -47,6 +47,6 @@ class PathStatistics:
     @property
     def fan(self) -> np.ndarray:
         """Percentiles FAN_PERCENTILES of the magnitude of the pitch error (5, rows), each within
-        ``streamed.ACCURACY``.
+        ``streamed.QUANTILE_ACCURACY``.
         """
         return self._spread.percentiles(FAN_PERCENTILES)
