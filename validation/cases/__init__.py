@@ -9,8 +9,8 @@ A case module holds
 ``tables(data) -> [Table]`` and ``draw(data) -> [(caption, Figure)]``, both optional
     what the report shows beside the rows, from the saved data alone: it never simulates
 
-A row that rests on a run which broke an assumption fails; ``validation.common.grounds.allowing_breaches`` says why a run
-may.
+A row that rests on a run which broke an assumption fails; ``validation.common.grounds.allowing_breaches`` says why a
+run may.
 """
 
 CASES = (

@@ -2,9 +2,9 @@
 
 Every number depends on the samples about it alone, never on where a block begins: a run in blocks reads the same bits
 as a run in one piece. Between samples hub forces follow the cubic through the four about it: a straight line takes 1 to
-2 % off the damage of bushes at 500 Hz. Gaps of at most ``LONGEST_BRIDGED_GAP`` s in a hub force are bridged (see ``gaps``)
-and told; longer ones are refused. Gaps in angles and rates are the filter's business; before angles are enforced they are
-bridged, too.
+2 % off the damage of bushes at 500 Hz. Gaps of at most ``LONGEST_BRIDGED_GAP`` s in a hub force are bridged (see
+``gaps``) and told; longer ones are refused. Gaps in angles and rates are the filter's business; before angles are
+enforced they are bridged, too.
 """
 
 from dataclasses import dataclass
