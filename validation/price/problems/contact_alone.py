@@ -55,7 +55,7 @@ class ContactSolver:
 class ContactAlone:
     """Test problem: rolling contacts with their exact forces; see ``validation.price.problems.Problem``."""
 
-    key, duration, sure = "contact", 1.0, 0.25
+    key, duration, uncertain_share = "contact", 1.0, 0.25
     note = (
         "Cells are those of the square about the contact; the exact theory solves for all of them together, others "
         "march along strips. Seconds are those of all contacts, one call from Python each."
