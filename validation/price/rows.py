@@ -11,7 +11,7 @@ ORDER_TOLERANCE = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}
 """Allowed distance of the observed from the declared order: at these steps the next power still shows,
 the more the higher the order (RK4 between 1 and 0.25 ms: 4.17)."""
 REFERENCE_SHARE = 1e-4
-"""Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``uncertain_share`` of its own."""
+"""Share of the finest tolerance that a reference may leave uncertain, where a problem has no ``uncertain_share``."""
 SETTLED_RATIO = 0.9
 """Of the last but one error: a curve that falls no further has come down to its theory's own."""
 INTERPOLATION_FACTOR = 1.25
