@@ -95,7 +95,7 @@ def _fitting(mechanism: Mechanism, output: OutputFile) -> tuple[Mechanism, dict[
     parts = np.column_stack([travel, rate, np.ones(len(travel))])[early]
     stiffness, damping, held = np.linalg.lstsq(parts, law[early], rcond=None)[0].tolist()
     constants = {"stiffness": stiffness, "damping": damping, "rest": -held / stiffness}
-    return moved.with_spring(**constants), constants
+    return moved.with_spring(stiffness=stiffness, damping=damping, free_length=constants["rest"]), constants
 
 
 def _sprung(mechanism: Mechanism, output: OutputFile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
