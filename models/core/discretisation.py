@@ -102,16 +102,19 @@ def estimate(
 
     coarse : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
     """
-    gap, order = _rms(fine - coarse), declared
+    gap, order = root_mean_square(fine - coarse), declared
     if coarser is not None and len(coarser) > 1:
         window = slice(0, 2 * len(coarser) - 1, 2)
-        order = observed_order(_rms((fine - coarse)[window]), _rms(coarse[window] - coarser), declared)
+        order = observed_order(
+            root_mean_square((fine - coarse)[window]), root_mean_square(coarse[window] - coarser), declared
+        )
     largest = float(np.abs(fine).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ONE_ROUNDING * largest * math.sqrt(len(fine)))
     return estimate_rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
 
 
-def _rms(values: np.ndarray) -> float:
+def root_mean_square(values: np.ndarray) -> float:
+    """Root mean square of values of any shape; infinite where squares are too large, 0 where there are none."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
 
@@ -234,10 +237,10 @@ def _growth_after_window(gap: np.ndarray, values: np.ndarray) -> float:
     """
     if len(gap) < 4:
         return 1.0
-    first, second = _rms(gap[: len(gap) // 2]), _rms(gap[len(gap) // 2 :])
+    first, second = root_mean_square(gap[: len(gap) // 2]), root_mean_square(gap[len(gap) // 2 :])
     power = 0.5 * (math.log2(1.0 + (second / first) ** 2) - 1.0) if first > 0.0 else 0.0
     bends = np.diff(values, 2, axis=0)
-    before, over_all = _rms(bends[: len(gap) - 2]), _rms(bends)
+    before, over_all = root_mean_square(bends[: len(gap) - 2]), root_mean_square(bends)
     rougher = over_all / before if before > 0.0 else 1.0
     return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST_ERROR_GROWTH))
 
@@ -271,7 +274,7 @@ def of_tolerance(
         same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
         at = values if same else CubicSpline(fine.times, values)(looser.times)
         error = max(
-            _rms(at - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
+            root_mean_square(at - looser.channels[name]) / (factor**TOLERANCE_POWER - 1.0),
             LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)

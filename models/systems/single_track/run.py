@@ -5,7 +5,14 @@ import time
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, estimate_rescaled, observed_order, size_of, with_stated_errors
+from models.core.discretisation import (
+    Estimate,
+    estimate_rescaled,
+    observed_order,
+    root_mean_square,
+    size_of,
+    with_stated_errors,
+)
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.core.smoothing import low_passed
@@ -66,18 +73,14 @@ def _with_step_error(run: Result, scene: SingleTrackScene, given: np.ndarray, dr
     told = {}
     for name, finer in quarter.items():
         fine, values = half[name], np.asarray(run[name])
-        order = observed_order(_rms(finer - fine), _rms(fine - values), ORDER)
-        error = _rms(fine - values) / (1.0 - 0.5**order)
+        order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), ORDER)
+        error = root_mean_square(fine - values) / (1.0 - 0.5**order)
         told[name] = estimate_rescaled(
             Estimate(error, run.data[name].attrs["units"], 0.0, order, period), size_of(values), period
         )
     return with_stated_errors(
         run, told, "steps of a half and a quarter of the drive's sampling period", "s between samples"
     )
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _sensed_in_parts(scene: SingleTrackScene, given: np.ndarray, period: float, parts: int) -> dict[str, np.ndarray]:
