@@ -98,6 +98,13 @@ def test_what_does_not_fit_is_told(run, tmp_path):
     assert "did you mean 'pitch'?" in told(f"time [s],pitsch [rad]\n{rows}\n")
     assert "has no unit: write f1 [N]" in told(f"time [s],f1\n{rows}\n")
     assert "is the unit of another quantity: the channel is in N" in told(f"time [s],f1 [m]\n{rows}\n")
+    empty = "\n".join(f"{0.1 * i}," for i in range(20))
+    assert "f1: has no values" in told(f"time [s],f1 [N]\n{empty}\n")
+
+
+def test_times_in_doubt_are_told(run, tmp_path):
+    (tmp_path / "m.csv").write_text("time [s],f1 [N]\n0,1\n0,2\n0.02,3\n0.04,1\n0.06,2\n")
+    assert any("m.csv" in note and "time" in note for note in overlay_of_run(run, tmp_path / "m.csv").notes)
 
 
 def test_what_does_not_move_has_no_relative_error(run, tmp_path):

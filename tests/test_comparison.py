@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
+from models.core.result import Result
 from models.systems.pitch_plane.run import run as simulate
-from studies.command.comparison import compare
+from studies.command.comparison import compare, compare_runs, comparison_lines
 from validation.common.scenes import road_scene
 
 
@@ -46,6 +47,14 @@ def test_another_step_is_read_by_a_spline_and_said(run, tmp_path):
     found, _ = compare(saved(run, tmp_path / "a.nc"), saved(coarse, tmp_path / "b.nc"))
     states = {each.name: each for each in found}
     assert states["pitch"].note and states["pitch"].largest < 1e-7  # order 4 and a cubic spline on 0.25 ms
+    assert "only from" not in states["pitch"].note
+
+
+def test_a_shorter_run_is_compared_as_far_as_it_lasts_and_this_is_said(run):
+    half = Result(run.data.isel(time=slice(0, len(run.times) // 2 + 1)))
+    found, notes = compare_runs(run, half, ("long", "short"))
+    told = "\n".join(comparison_lines(found, notes))
+    assert "are the same to the last bit" in told and "only from 0 to 0.05 s, the part that both runs have" in told
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def test_a_planted_difference_is_told_first(scene, result):
 
 
 def test_a_price_names_the_cheapest_setting(scene):
-    report = twinrig.price(scene, 1.0, "f1", "reference")
+    report = twinrig.price(scene, 1.0, ["f1"], "reference")
     assert "RK4" in repr(report) and report.detail.winners["", "calls"].error <= 1.0
     assert report.values["tolerance"] == 1.0
 
@@ -208,6 +208,8 @@ ERRORS = {
     "no result": (lambda r: twinrig.compare("study_road", r), "give what twinrig.run returns"),
     "no price": (lambda r: twinrig.price("ride", 1.0), "accuracy is priced in scenes of other systems"),
     "tolerance": (lambda r: twinrig.price("study_road", -1.0), "^tolerance = -1.0: must be a finite number above 0"),
+    "no steps": (lambda r: twinrig.price("race_car", 1.0), "system = 'single-track'.*no steps to choose"),
+    "no quantity": (lambda r: twinrig.price("study_road", 1.0, 3), "^quantity = 3: must be a name, or a list of names"),
     "no engine": (lambda r: twinrig.export("handling", "adams"), "^engine = 'adams': no engine that has files"),
     "no vehicle": (lambda r: twinrig.export("contact_ellipse", "mujoco"), "no vehicle that an engine builds"),
     "no such file": (lambda r: twinrig.export("handling", "mujoco", "x.py"), "^file = 'x.py': must end in .xml"),

@@ -171,6 +171,8 @@ def test_a_recommendation_holds_beside_another_solver():
     [
         (0.0, None, "--tolerance = 0.0: must be a finite number above 0"),
         (float("nan"), None, "--tolerance"),
+        ("little", None, "--tolerance = 'little': must be a finite number"),
+        (True, None, "--tolerance = true: must be a finite number"),
         (1.0, "f9", "--quantity = 'f9': is no channel"),
         (1.0, "f1,pitch", "has several units, N and rad"),
     ],
@@ -178,6 +180,19 @@ def test_a_recommendation_holds_beside_another_solver():
 def test_what_cannot_be_asked_is_one_message(tolerance, quantity, message):
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         price(build(RELEASE), tolerance, quantity, ("reference",))
+
+
+def test_a_run_of_one_step_has_a_price():
+    answer = price(build(RELEASE | {"run": {"duration": 1e-3}}), 5.0, None, ("mujoco",))
+    assert answer.winners["", "calls"].error <= 5.0
+
+
+def test_sensors_do_not_decide_which_steps_are_tried():
+    sensors = {"accelerometers": {"sampling_rate": 250.0, "sensors": {"roof": {"x": 0.1, "z": -0.9}}}}
+    with_sensors = build(RELEASE | {"effects": sensors})
+    price(with_sensors, 5.0, None, ("mujoco",))
+    with pytest.raises(InputError, match=r"ax1.*is no channel"):
+        price(with_sensors, 5.0, "ax1", ("mujoco",))
 
 
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])

@@ -235,6 +235,8 @@ def test_what_cannot_be_is_refused():
     start[eq.YAW_RATE] = 50.0
     with pytest.raises(RunFailed, match="leaves the track"):
         equations.run(start, 1.0, 5e-4)
+    with pytest.raises(RunFailed, match="mass = 1e-06 kg"):
+        _ = Equations(CHOSEN_WHEELSET.changed(mass=1e-6), 50.0).rest
 
 
 def test_first_harmonic_of_a_table():

@@ -200,13 +200,18 @@ def _name(given: Any, otherwise: str) -> str:
 
 
 def price(
-    scene: AnyScene, tolerance: float, quantity: str | None = None, engine: str = "all", *, set: Changes = None
+    scene: AnyScene,
+    tolerance: float,
+    quantity: "str | list[str] | None" = None,
+    engine: str = "all",
+    *,
+    set: Changes = None,
 ) -> "Report":
     """Find the cheapest engine, integrator and step that hold a quantity of a scene to a tolerance, by runs.
 
-    tolerance : largest error that is allowed, in the quantity's unit; quantity : channels, as "f1,f2", if not the usual
-    one of the system; engine : one, or all. The detail is the ``Recommendation``. Raises InputError for scenes that
-    have no steps to choose, RunFailed where nothing is known.
+    tolerance : largest error that is allowed, in the quantity's unit; quantity : channels, as "f1,f2" or a list, if
+    not the usual one of the system; engine : one, or all. The detail is the ``Recommendation``. Raises InputError for
+    scenes that have no steps to choose, RunFailed where nothing is known.
     """
     from models.advice.price.recommendation import price as recommended
     from models.advice.price.text import as_dict, recommendation_lines
@@ -218,8 +223,17 @@ def price(
     with _as_library(loaded):
         engines = engines_of(engine, loaded.system, "engine")
         with progress_bar("runs of every engine in ever finer steps", loaded.system):
-            answer = recommended(loaded, tolerance, quantity, engines)
+            answer = recommended(loaded, tolerance, _channels_in_words(quantity), engines)
     return Report(tuple(recommendation_lines(answer)), as_dict(answer), answer)
+
+
+def _channels_in_words(quantity: "str | list[str] | None") -> str | None:
+    """Channels as the command line takes them, separated by commas."""
+    if quantity is None or isinstance(quantity, str):
+        return quantity
+    if not isinstance(quantity, list | tuple) or not all(isinstance(name, str) for name in quantity):
+        raise InputError("quantity", "", quantity, "must be a name, or a list of names")
+    return ",".join(quantity)
 
 
 def choose(

@@ -197,7 +197,8 @@ class OnSprings:
         if status == FOLDED:
             raise RunFailed(self.engine, f"the train jackknifes: a hitch yaws by more than {FOLD:.2f} rad", time)
         if status == GAVE_UP:
-            raise RunFailed(self.engine, "the engine gave up", time)
+            reason = "the engine gave up, since the motion grew without bound: raise run.substeps"
+            raise RunFailed(self.engine, reason, time)
         return status
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:

@@ -153,5 +153,5 @@ class Rolling:
         note = solve(self.mbs, Settings(solver, step, steps * step), options)
         state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
         if note or not np.isfinite(state).all():
-            raise RunFailed("exudyn", f"the engine gave up{note}")
+            raise RunFailed("exudyn", f"the engine gave up{note}: shorten the step")
         return state

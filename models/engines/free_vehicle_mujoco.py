@@ -11,7 +11,7 @@ from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_layout import check
-from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_march import GAVE_UP, Marcher
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_quiet import installed, without_warnings
 from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
@@ -182,5 +182,5 @@ class FreeMujoco(FreeModel):
             mujoco.mj_step(self.model, data)
         after = np.concatenate((data.qpos, data.qvel))
         if data.time < 0.5 * step or not np.isfinite(after).all():
-            raise RunFailed("mujoco", "the engine gave up", data.time)
+            raise RunFailed("mujoco", GAVE_UP, data.time)
         return after

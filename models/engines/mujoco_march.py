@@ -15,6 +15,8 @@ CHUNK = 4096
 """Steps between two looks at the guard."""
 FORCE_CALLS = {"RK4": 4}
 """Evaluations of the forces in a step of an integrator; 1 in those that are not here."""
+GAVE_UP = "the engine gave up, since the motion grew without bound: shorten the step, or soften what is stiff"
+"""Reason of a run after which MuJoCo's time is not that of its last step: it began again at time zero."""
 
 
 def warnings(data: mujoco.MjData) -> str:
@@ -43,7 +45,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
             if late.any() or warnings(data):
                 end = first + (int(np.argmax(late)) if late.any() else len(rows))
                 guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
-                raise RunFailed("mujoco", f"the engine gave up{warnings(data)}", times[end], path[end, 1:])
+                raise RunFailed("mujoco", f"{GAVE_UP}{warnings(data)}", times[end], path[end, 1:])
     return path[:, 1:]
 
 
@@ -69,5 +71,5 @@ class Marcher:
         if failed.any():
             failed_path = path[int(failed.argmax())]
             last = failed_path[int(failed_path[:, 0].argmax())]
-            raise RunFailed("mujoco", "the engine gave up", float(last[0]), last[1:])
+            raise RunFailed("mujoco", GAVE_UP, float(last[0]), last[1:])
         return path[..., 1:]

@@ -311,7 +311,12 @@ class Equations:
 
         solution = root(lambda unknown: self.rates(moved(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)
         if np.abs(solution.fun).max() > 1e-6:
-            raise RunFailed("wheelset", "no height was found at which both rails carry it")
+            w = self.wheelset
+            raise RunFailed(
+                "wheelset",
+                f"no height was found at which both rails carry load = {w.load:g} N with mass = {w.mass:g} kg: give "
+                "values of a real wheelset",
+            )
         return moved(solution.x)
 
     @cached_property

@@ -152,15 +152,15 @@ def overlay_of_run(run: Result, file: str | Path, shift: float | None = None) ->
         theirs = [channel.name for channel in source.channels]
         name = next((each for each in theirs if suggestion_phrase(each, tuple(ours))), theirs[0] if theirs else None)
         raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
-    pairs = {name: _channel_pair(source, channel, ours[name]) for name, channel in named.items()}
+    doubts = list[str]()
+    pairs = {name: _channel_pair(source, channel, ours[name], doubts) for name, channel in named.items()}
     moved_by = time_shift(list(pairs.values())) if shift is None else TimeShift(shift, np.nan)
     matches = [_channel_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
     kept = [match for match in matches if match is not None]
     if not kept:
         raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
-    return Overlay(
-        moved_by, sorted(kept, key=lambda each: -each.relative), [*_missing_channel_notes(source, ours, engines)]
-    )
+    notes = [*_missing_channel_notes(source, ours, engines), *dict.fromkeys(doubts)]
+    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), notes)
 
 
 def _by_engine(name: str, engines: list[str], ours: Mapping[str, Quantity]) -> list[str]:
@@ -180,15 +180,19 @@ def _missing_channel_notes(source: Source, ours: Mapping[str, Quantity], engines
             )
 
 
-def _channel_pair(source: Source, channel: Channel, ours: Quantity) -> ChannelPair:
-    """Times and values of one channel in the run and in the measurement, both in the run's unit."""
+def _channel_pair(source: Source, channel: Channel, ours: Quantity, doubts: list[str]) -> ChannelPair:
+    """Times and values of one channel in the run and in the measurement, both in the run's unit; ``doubts`` gets what
+    its times make doubtful."""
     if not channel.unit and ours.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
         raise InputError(source.path, channel.name, None, allowed)
     factor = factor_between(channel.unit, ours.unit, source.path, channel.name)
     blocks = list(source.blocks([channel.name]))
     times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
+    if not np.isfinite(values).any():
+        raise InputError(source.path, channel.name, None, "has no values: no cell of it holds a number")
     clock = sample_timing(times, str(source.path), (channel.name,))
+    doubts.extend(each.text for each in clock.findings)
     return ChannelPair(
         ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order])
     )

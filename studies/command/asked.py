@@ -139,7 +139,7 @@ def _csv_files_of_table(table: Any) -> Iterator[str]:
 def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
     """The requested engines; none for a system that runs without an engine. option : the option that names them."""
     engines = KNOWN_SYSTEMS[system].engines
-    if name is not None and not engines:
+    if name not in (None, "all") and not engines:
         raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
         return engines

@@ -252,9 +252,20 @@ def _difference_in_time(name: str, first: Quantity, second: Quantity, file: obje
         raise InputError(file, name, None, "has no times in common with the first")
     times = coarse.grid[inside]
     pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
-    note = f"on {len(times)} common rows, the denser run by a cubic spline"
+    note = (
+        f"on {len(times)} common rows, the denser run by a cubic spline{_common_part(times, first.grid, second.grid)}"
+    )
     both = pair if fine is first else pair[::-1]
     return QuantityDifference(name, first.unit, first.over, times, *both, note, stated=first.error + second.error)
+
+
+def _common_part(times: np.ndarray, *grids: np.ndarray) -> str:
+    """Phrase on the times (s) that were compared, where one run begins later or ends earlier than the other."""
+    begin, end = (float(pick(np.concatenate(grids))) for pick in (np.min, np.max))
+    spacing = min(float(np.diff(grid).max()) for grid in grids)
+    if times[0] - begin < spacing and end - times[-1] < spacing:
+        return ""
+    return f"; only from {times[0]:g} to {times[-1]:g} s, the part that both runs have of {begin:g} to {end:g} s"
 
 
 def report(first: Path, second: Path, folder: Path) -> dict[str, Any]:
@@ -291,8 +302,9 @@ def comparison_lines(differences: list[QuantityDifference], notes: list[str]) ->
 
 def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     differ = [each for each in differences if each.largest > 0.0]
+    notes = [f"  {note}" for note in dict.fromkeys(each.note for each in differences if each.note)]
     if not differ:
-        return [f"  all {len(differences)} quantities are the same to the last bit"]
+        return [f"  all {len(differences)} quantities are the same to the last bit", *notes]
     shown = [each for each in differences[:SHOWN_QUANTITIES] if each.largest > 0.0]
     same, more = len(differences) - len(differ), len(differ) - len(shown)
     return [
@@ -303,7 +315,7 @@ def _file_lines(differences: list[QuantityDifference]) -> list[str]:
         ),
         *([f"  {more} more that differ less: compare.csv"] if more else []),
         *([f"  the same to the last bit: {same} of {len(differences)}"] if same else []),
-        *(f"  {note}" for note in dict.fromkeys(each.note for each in differences if each.note)),
+        *notes,
     ]
 
 

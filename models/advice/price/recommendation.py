@@ -9,12 +9,14 @@ Whatever is timed runs in this process, with nothing beside it. What is not may 
 settings of a reference, the runs that confirm the winners, and those whose errors are told against a finer truth.
 """
 
+import math
 import time
 from collections.abc import Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -109,7 +111,8 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
 
     The scene's crew computes what is not timed.
     """
-    if not (np.isfinite(tolerance) and tolerance > 0.0):
+    plain_number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+    if not (plain_number and math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
     to_price = priced_scene(scene, quantity, engines)
     with Crew.of(scene, usual=1).at_work(UNTIMED_RUNS_AT_ONCE, *places_of(scene)) as pool:

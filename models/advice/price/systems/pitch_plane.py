@@ -40,6 +40,10 @@ USUAL_QUANTITY = {
     "heave-pitch": "enforced_force",
 }
 """The quantity that is asked about where the user names none, by what drives the vehicle."""
+SENSORS = frozenset({"accelerometers", "gyro", "gyro_bias", "pitch_sensor"})
+"""Effects that read and move nothing: they are left out, or no step could be tried that misses a sampling time."""
+FEWEST_ROWS = 4
+"""Rows of the reference between which other rows are interpolated."""
 ROW_SPACING = 1e-3
 """s: of the rows of an adaptive method from outside the tree."""
 SECOND_SOLVER_TOLERANCE = 1e-10
@@ -115,7 +119,8 @@ class PricedPitchPlane:
 
     def reference(self) -> SettingLadder:
         """Ladder of the reference: RK4 on the written equations; each step is half the one before."""
-        most = max(1, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
+        fewest = math.ceil((FEWEST_ROWS - 1) * self.base / self.first * (1 - 1e-9))
+        most = max(fewest, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
         return SettingLadder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
     def second(self, reference_setting: Setting) -> Setting | None:
@@ -174,11 +179,16 @@ def _outside_engine_lines(setting: Setting) -> list[str]:
 
 def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> PricedPitchPlane:
     """The scene with a quantity to price: channels of its result that share a unit, separated by commas."""
-    assembly = assembly_of_scene(scene)
+    assembly = assembly_of_scene(_without_sensors(scene))
     channels = tuple(name.strip() for name in (quantity or USUAL_QUANTITY[assembly.mode]).split(","))
     base, first = _base_step_and_duration(assembly)
     asked = PricedPitchPlane(assembly, engines, channels, "", base, first)
     return replace(asked, unit=_unit(asked))
+
+
+def _without_sensors(scene: Scene) -> Scene:
+    """The scene without sensors."""
+    return scene.model_copy(update={"effects": {name: of for name, of in scene.effects.items() if name not in SENSORS}})
 
 
 def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
