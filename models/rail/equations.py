@@ -102,7 +102,7 @@ def rates(state, speed, body, rails, out, report):
     set_rates(state, speed, Body(*body), made, out, report, room_for(made.profile))
 
 
-@inlined
+@lean
 def set_rates(state, speed, body, rails, out, report, room):
     """Fill ``out`` with the time derivative of a state, using the workspace ``room``; ``report`` may have no rows if no
     one needs it."""

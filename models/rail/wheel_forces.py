@@ -188,7 +188,7 @@ def room_for(profile):
     )
 
 
-@inlined
+@lean
 def contact_points(pose, rails, touches):
     """Fill ``touches``, TOUCH (patches,), the right wheel's first; touches far from contact get no normal."""
     each, wheels = len(touches) // 2, rails.wheels[0]
@@ -232,7 +232,7 @@ def _linear_forces(a, b, motion, shear, poisson):
     return fx, fy, shear * (turn * y - area**2 * c[3] * spin)
 
 
-@inlined
+@lean
 def _fill_one_direction(sign, contacts, slip, speed, rails, wheel_forces):
     """Fill fx, fy, mz for wheels that roll forwards (sign 1), or for mirror images of wheels that roll backwards (sign
     -1)."""
@@ -304,7 +304,7 @@ def wheel_forces(pose, rails, report, room):
         patch_by_patch(pose, rails, report, room)
 
 
-@inlined
+@lean
 def _linear_cones(pose, wheels, wheelset, report):
     """``patch_by_patch`` for cones with the linear law that roll forwards, without storing intermediate values."""
     cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
