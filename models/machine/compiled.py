@@ -17,6 +17,7 @@ from typing import Any
 from uuid import uuid4
 
 import numba
+from numba.core.types import unliteral
 
 ROOT = Path(__file__).parents[2]
 COMMON = tuple(ROOT / "models" / name for name in ("vehicles", "engines", "contact", "machine"))
@@ -57,6 +58,7 @@ def inlined(function: Callable) -> Any:
 def _kept_apart(compiled: Any) -> Any:
     """The compiled function with changed cache files: names that do not depend on a shared counter, and stamps of the
     sources."""
+    _without_literals(compiled)
     file = getattr(compiled._cache, "_cache_file", None)  # there is none where nothing is kept
     if file is not None:
         stem = file._index_name.removesuffix(".nbi")
@@ -64,6 +66,18 @@ def _kept_apart(compiled: Any) -> Any:
         file._source_stamp = stamp(*_files(compiled.py_func))
         file._load_index = _or_none(file._load_index)
     return compiled
+
+
+def _without_literals(compiled: Any) -> None:
+    """Compile the function once for all numbers that its callers write out: numba would compile it for each."""
+    template = compiled.get_call_template
+
+    def plain(types: Any, keywords: dict[str, Any]) -> Any:
+        return template(
+            tuple(unliteral(each) for each in types), {name: unliteral(each) for name, each in keywords.items()}
+        )
+
+    compiled.get_call_template = plain
 
 
 def _or_none(load: Callable[[], dict]) -> Callable[[], dict]:
