@@ -153,7 +153,7 @@ def share_out(loads, places):
         rear[0], rear[1] = 0.5 * (back - kept_back), 0.5 * (back + kept_back)
 
 
-@inlined
+@lean
 def respond(motion, before, after, step, vehicle, frame):
     """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
     ``motion``. A step's solution is a fixed point of this map. before, after (W,) : torques at the ends of the step."""
