@@ -200,3 +200,15 @@ def test_classes_that_kernels_take_are_in_files_that_import_no_engine():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_function_is_compiled_once_for_all_numbers_that_its_callers_write_out():
+    @compiled.njit()
+    def shifted(x, offset):
+        return x + offset
+
+    @compiled.njit()
+    def summed(x):
+        return shifted(x, 1) + shifted(x, 2)
+
+    assert summed(1.0) == 5.0 and len(shifted.signatures) == 1
