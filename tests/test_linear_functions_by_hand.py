@@ -17,7 +17,7 @@ from models.multibody.numbers import _frame, _put_curves
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.multibody.plain.motion import generator
 from models.rail.equations import ROLL, YAW, Equations, Y
-from models.rail.linear import _contact_kinematics, critical_or_why, kalker_matrix, largest_growth
+from models.rail.linear import _contact_kinematics, critical_or_why, kalker_matrix, largest_growth, linear_matrices
 from models.rail.wheel_forces import plain_rails
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.ride.covariance import rounding_thresholds
@@ -69,6 +69,7 @@ def test_points_of_a_body_move_by_its_levers():
     assert kinematics.shift("body", point) @ q == pytest.approx(moved, rel=1e-12)
     assert kinematics.turn("body") @ q == pytest.approx(q[3:6], rel=1e-12)
     assert kinematics.coordinate("body", "ry") @ q == -0.375 and not kinematics.coordinate("fl", "ry").any()
+    assert {*kinematics.turn("fl").flat, *kinematics.coordinate("body", "ry")} == {0.0, 1.0}
 
 
 def test_generators_of_skew_axes_move_along_them_and_turn_about_them():
@@ -133,7 +134,8 @@ def test_the_road_under_a_wheel_has_the_density_of_its_level():
 def test_thresholds_of_rounding_grow_with_the_square_of_the_terms():
     """Of y = 0.5 a - 0.5 b, each of deviation 2: terms that sum up to 2 in absolute values."""
     few, many = (rounding_thresholds(size * np.array([[0.5, -0.5]]), 4.0 * np.eye(2))[0] for size in (1.0, 3.0))
-    assert many == pytest.approx(9.0 * few, rel=1e-12) and few == pytest.approx((1e-10 * 2.0) ** 2, rel=1e-12)
+    assert many == pytest.approx(9.0 * few, rel=1e-12, abs=0.0)
+    assert few == pytest.approx((1e-9 * 2.0) ** 2, rel=1e-12, abs=0.0)
 
 
 def test_a_singular_matrix_is_split_into_its_range_and_its_null_space():
@@ -150,7 +152,7 @@ def test_rounding_of_the_slowest_decay_is_that_of_the_fastest_motion():
     """An uncoupled system, whose eigenvectors are perpendicular: 8 against 0.25."""
     system = modes(np.diag([-8.0, -0.25, -2.0]))
     assert system.condition == 1.0
-    assert system.rate_rounding == pytest.approx(np.finfo(float).eps * 8.0 / 0.25, rel=1e-12)
+    assert system.rate_rounding == pytest.approx(np.finfo(float).eps * 8.0 / 0.25, rel=1e-12, abs=0.0)
 
 
 def test_a_bicycle_is_judged_until_it_leans_by_a_radian():
@@ -218,6 +220,25 @@ def test_at_its_critical_speed_a_motion_neither_grows_nor_dies():
     critical, why = critical_or_why(W)
     assert why == "" and abs(largest_growth(W, critical)) < 1e-9 * abs(largest_growth(W, 0.9 * critical))
     assert largest_growth(W, 0.995 * critical) < 0.0 < largest_growth(W, 1.005 * critical)
+
+
+def test_the_largest_growth_is_that_of_the_roots_of_the_characteristic_polynomial():
+    """det(M s^2 + D s + K) of two coordinates, with polynomials in s as entries."""
+    linear = linear_matrices(W, 50.0)
+    (a, b), (c, d) = np.moveaxis(np.array([linear.mass, linear.damping, linear.stiffness]), 0, -1)
+    roots = np.roots(np.convolve(a, d) - np.convolve(b, c))
+    assert largest_growth(W, 50.0) == pytest.approx(roots.real.max(), rel=1e-6)
+
+
+def test_the_fastest_rate_of_a_wheelset_is_its_matrix_s_spectral_radius():
+    """Gelfand's formula, |A^n|^(1/n), with n = 2^40 by squaring."""
+    equations = Equations(W, 20.0, "linear", 5)
+    power, logarithm = equations.state_matrix, 0.0
+    for doubling in range(40):
+        size = np.linalg.norm(power)
+        logarithm += math.log(size) / 2.0**doubling
+        power = (power / size) @ (power / size)
+    assert equations._fastest_rate == pytest.approx(math.exp(logarithm), rel=1e-9)
 
 
 def test_a_growth_that_is_written_out_has_its_own_critical_speed():

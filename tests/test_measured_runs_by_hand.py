@@ -17,6 +17,7 @@ from models.measured.columns import Columns, MemoryColumns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
+from models.multibody.cut_table import joints
 from models.systems.hub_forces.measurement import element_travels
 from models.systems.measured.hand_on import labelled_result
 from models.systems.measured.inputs import Inputs, StepGrid
@@ -24,7 +25,13 @@ from models.systems.measured.run import _record_seconds, run
 from models.systems.measured.scene import build
 from models.systems.measured.section_run import AttitudeHold, SectionOutcome, SectionRun
 from models.systems.measured.section_run import run as march
-from models.systems.measured.sections import AccelerometerPoint, SectionChannel, Sections, accelerometer_points
+from models.systems.measured.sections import (
+    AccelerometerPoint,
+    SectionChannel,
+    Sections,
+    _guide_arrays,
+    accelerometer_points,
+)
 from models.systems.measured.virtual import (
     VirtualTable,
     _chassis_motion,
@@ -147,6 +154,17 @@ def test_accelerometers_sit_where_the_scene_and_the_vehicle_say():
     )
 
 
+def test_behind_a_guide_of_a_car_acts_what_the_guided_body_bears():
+    """All bodies ride on the chassis: 1 where the body, the hub or an element's end is the guided one, else 0."""
+    last, behind = _guide_arrays(CAR, joints(CAR))
+    coordinates = [body for body, _ in CAR.tree.coordinates()]
+    guided = [body.name for body in CAR.uncut.bodies if body.name != "body"]
+    heavy = [body.name for body in CAR.tree.bodies if body.mass > 0.0]
+    ends = [end for e in CAR.elements for end in (e.first_body, e.second_body, e.frame)]
+    assert last.tolist() == [len(coordinates) - 1 - coordinates[::-1].index(name) for name in guided]
+    assert behind.tolist() == [[float(body == name) for body in (*heavy, *LOADS, *ends)] for name in guided]
+
+
 def test_a_result_has_the_samples_and_the_counts_of_its_section_forces(tmp_path):
     force, travel = SectionChannel("a F", "N", "", "a"), SectionChannel("a travel", "m", "", "a")
     columns = Columns(tmp_path / "run.f64", ("a F", "a travel"), 4)
@@ -237,5 +255,5 @@ def test_a_virtual_measurement_begins_at_rest_with_the_weight_on_its_wheels():
     assert {hub: first[f"{hub}_fz"] for hub in LOADS} == pytest.approx(LOADS, rel=1e-9)
     assert first["left seat_force"] == pytest.approx(60.0 * GRAVITY, rel=1e-9)
     assert first["dash_az"] == pytest.approx(GRAVITY, abs=1e-3)  # the road begins gently
-    assert (virtual.step, virtual.period, virtual.every, virtual.errors) == (1e-3, PERIOD, 2, {})
+    assert (virtual.step, virtual.period, virtual.stride, virtual.errors) == (1e-3, PERIOD, 2, {})
     assert virtual.samples(Faults(), 1).tolist() == virtual.values[::2].tolist()
