@@ -89,9 +89,8 @@ def test_extremes_stay_finite():
 def test_aspect_solves_its_equation(curvatures):
     g, cosine, sine = aspect(curvatures)
     assert (cosine, sine) == integrals(g)
-    assert g * g * sine / cosine == pytest.approx(
-        curvatures, rel=1e-12, abs=0.0
-    )  # ln g is known to 1e-16, g to 460 times that
+    # ln g is known to 1e-16, g to 460 times that
+    assert g * g * sine / cosine == pytest.approx(curvatures, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize(
