@@ -23,6 +23,10 @@ HEADINGS = {
     ]: "A fault in these moves where a search begins, or its steps, and no value beyond the stated error, "
     "as a test of each proves:",
     WHY_HARMLESS[1]: "These hand on views of what they are given, arrays that are written over, zeros, or nothing:",
+    WHY_HARMLESS[
+        2
+    ]: "These select by arrays of zeros and ones, which the audit leaves as they are; a test of each holds "
+    "them to the right places:",
 }
 """What stands before the list of each kind of ``uncovered_functions``."""
 

@@ -374,7 +374,11 @@ def is_no_number(node, given):
     """Whether an expression is a view of an argument, a new array that is written over, 0, not a number or a status."""
     if isinstance(node, ast.Call):
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-        return name in ("empty", *STATUSES) or (
+        if name == "view":
+            return is_no_number(node.func.value, given)
+        if name == "full":
+            return is_no_number(node.args[1], given)
+        return name in ("empty", "zeros", *STATUSES) or (
             name[0].isupper() and all(is_no_number(each, given) for each in node.args)
         )
     if isinstance(node, ast.Tuple):
@@ -383,7 +387,7 @@ def is_no_number(node, given):
         return is_no_number(node.body, given) and is_no_number(node.orelse, given)
     is_zero = isinstance(node, ast.Constant) and node.value == 0.0
     is_status = isinstance(node, ast.Name) and (node.id.isupper() or node.id == "status")
-    return is_zero or is_status or ast.unparse(node) == "math.nan" or root_of(node, given) != ""
+    return is_zero or is_status or ast.unparse(node) in ("math.nan", "np.nan") or root_of(node, given) != ""
 
 
 @pytest.mark.parametrize("name", VIEWS)

@@ -16,8 +16,10 @@ from models.core.discretisation import (
     errors_of,
     estimate,
     estimated,
+    finite_rms,
     not_estimated,
     of_chance,
+    root_mean_square,
     rows_at,
     with_stated_errors,
 )
@@ -141,3 +143,8 @@ def test_reasons_and_chance_are_told():
     of_chance(run, {"heave": by_chance(0.1, 1.0, "m", 100)}, 100)
     assert error_lines(run)[1] == "standard error of 100 paths at most 10 % (heave: 0.1 m)"
     assert json.loads(run.data.attrs["error"])["chance"]["channels"]["heave"]["step"] == 2500
+
+
+def test_a_root_mean_square_of_nothing_is_zero_and_that_of_finite_values_leaves_out_others():
+    assert root_mean_square(np.array([[3.0], [-4.0]])) == finite_rms(np.array([3.0, np.nan, -4.0, np.inf])) == 12.5**0.5
+    assert root_mean_square(np.empty(0)) == finite_rms(np.full(2, np.nan)) == 0.0

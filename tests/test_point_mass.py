@@ -40,7 +40,7 @@ def test_discrete_covariance_is_a_sum_of_squares(h):
 def test_series_and_closed_form_meet(x):
     """Both sides of the switch: a jump there would be a wrong coefficient."""
     low, high = continuous_covariance(x, 1.0, 1.0, 1.0, 1.0), continuous_covariance(x * (1 + 1e-9), 1.0, 1.0, 1.0, 1.0)
-    assert high == pytest.approx(low, rel=4e-9)  # t^3 times 1 + 1e-9
+    assert high == pytest.approx(low, rel=4e-9, abs=0.0)  # t^3 times 1 + 1e-9
 
 
 def test_paths_follow_the_scheme():

@@ -90,7 +90,7 @@ def test_next_to_no_friction_turns_with_the_slip(part):
     motion = (1e-4, 1e-3, 100.0)
     found, other = (solve_rolling(PRESSED, MU * share, *motion, PAIR) for share in (part, 1e-8))
     whole = other.fy * part / 1e-8 if part > 1e-60 else 0.0
-    assert found.fy == pytest.approx(whole, rel=1e-6)
+    assert found.fy == pytest.approx(whole, rel=1e-6, abs=1e-60)
 
 
 @pytest.mark.parametrize(

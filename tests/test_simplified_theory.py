@@ -133,7 +133,7 @@ def test_displacement_is_that_of_the_half_space():
         PAIR,
     )[..., Z, Z]
     expected = np.einsum("jkmi,jk->mi", numbers, pressure)
-    assert displacement(pressure, 2e-4, 3e-4, PAIR.modulus) == pytest.approx(expected, rel=1e-10)
+    assert displacement(pressure, 2e-4, 3e-4, PAIR.modulus) == pytest.approx(expected, rel=1e-10, abs=0.0)
 
 
 @pytest.mark.parametrize("creepage", CREEPAGES)

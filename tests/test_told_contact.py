@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from models.core.assumptions import broken_of
-from models.core.discretisation import CELLS_NOTE, error_lines, errors_of
+from models.core.discretisation import CELLS_NOTE, error_lines, errors_of, finite_rms
 from models.core.errors import RunFailed
 from models.systems.contact import plan
 from models.systems.contact.run import run
 from models.systems.contact.scene import build
-from models.systems.contact.stated_error import finite_rms
 from models.systems.wheel_rail import plan as held_plan
 from models.systems.wheel_rail import run as wheel_rail
 from models.systems.wheel_rail.scene import build as held

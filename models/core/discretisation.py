@@ -119,6 +119,11 @@ def root_mean_square(values: np.ndarray) -> float:
         return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
 
 
+def finite_rms(values: np.ndarray) -> float:
+    """Root mean square of the finite values, 0 where there are none."""
+    return root_mean_square(values[np.isfinite(values)])
+
+
 def rows_at(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
     """Indices of the times in ``times`` (n,) nearest to the wanted ones (m,); both must be ascending."""
     after = np.clip(np.searchsorted(times, wanted_times), 1, len(times) - 1)

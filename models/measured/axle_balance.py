@@ -243,8 +243,8 @@ def _slope_and_scatter(times: np.ndarray, values: np.ndarray, pitch: np.ndarray 
 
 def _block_means(values: np.ndarray) -> np.ndarray:
     """Means of values (n, ...) over blocks of equal length along the first axis."""
-    parts = np.array_split(values, min(BLOCKS_OF_RECORD, max(len(values) // 2, 2)))
-    return np.array([part.mean(axis=0) for part in parts])
+    blocks = np.array_split(values, min(BLOCKS_OF_RECORD, max(len(values) // 2, 2)))
+    return np.array([block.mean(axis=0) for block in blocks])
 
 
 def _loads(p: Parameters) -> np.ndarray:

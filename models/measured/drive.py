@@ -61,8 +61,8 @@ def _read_drive(path: Path, stretch: tuple[float, ...], stamp: int) -> MeasuredD
 def on_even_grid(times: np.ndarray, values: np.ndarray, grid: np.ndarray, place: str) -> tuple[np.ndarray, int]:
     """Values (n,) on an even time grid, with straight lines across spikes and gaps, and the number of samples left out
     for that."""
-    kept = without_outliers(values)
-    known = np.isfinite(kept)
+    cleaned = without_outliers(values)
+    known = np.isfinite(cleaned)
     if known.sum() < FEWEST_SAMPLES:
         raise InputError(place, "", int(known.sum()), f"at least {FEWEST_SAMPLES} samples must be measured")
-    return np.interp(grid, times[known], kept[known]), int(len(kept) - known.sum())
+    return np.interp(grid, times[known], cleaned[known]), int(len(cleaned) - known.sum())

@@ -104,15 +104,15 @@ def quantised_values(values: np.ndarray, bits: int) -> np.ndarray:
     largest = float(np.abs(values).max())
     if largest == 0.0:
         return values
-    each = 2.0 * FULL_SCALE_RATIO * largest / 2**bits
-    return each * np.rint(values / each)
+    quantum = 2.0 * FULL_SCALE_RATIO * largest / 2**bits
+    return quantum * np.rint(values / quantum)
 
 
-def lost_samples(dropouts: Dropouts, at: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
+def lost_samples(dropouts: Dropouts, location: str, seed: int, path: int, count: int, period: float) -> np.ndarray:
     """Whether each of ``count`` samples of a transducer is lost (count,); the first and the last one never are."""
     from scipy.stats import norm
 
-    begins = _random_stream(at, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
+    begins = _random_stream(location, seed, path, count, DROPOUTS) > norm.isf(min(dropouts.rate * period, 1.0))
     length = max(round(dropouts.length / period), 1)
     lost = np.convolve(begins, np.ones(length))[:count] > 0.5
     lost[[0, -1]] = False
@@ -123,10 +123,10 @@ def _delayed_samples(true: np.ndarray, step: float, stride: int, delay: float) -
     """Every ``stride``-th sample, delayed by ``delay`` (s); before the start, the value stays at the first sample."""
     if delay == 0.0:
         return true[::stride].copy()
-    at = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
+    late_times = np.maximum(step * stride * np.arange(len(true[::stride])) - delay, 0.0)
     from scipy.interpolate import make_interp_spline
 
-    return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(at))
+    return np.asarray(make_interp_spline(step * np.arange(len(true)), true, k=3)(late_times))
 
 
 def _random_stream(name: str, seed: int, path: int, count: int, source: int) -> np.ndarray:

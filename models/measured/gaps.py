@@ -68,12 +68,12 @@ def filled_samples(values: np.ndarray, period: float, longest: float) -> tuple[n
     if not lost:
         return values, []
     out, mean, span = values.copy(), float(np.nanmean(values)), max(round(NEIGHBOUR_SPAN / period), 4)
-    every = max(2 * span // MOST_NEIGHBOURS, 1)
+    stride = max(2 * span // MOST_NEIGHBOURS, 1)
     law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
     gaps = []
     for first, end in lost:
         doubt = np.nan
-        known = _neighbour_samples(values, first, end, span, every)
+        known = _neighbour_samples(values, first, end, span, stride)
         if len(known) and (end - first) * period <= longest * (1 + 1e-9):
             guess, doubt = _conditional_mean(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
@@ -109,21 +109,21 @@ def bridged_signals(recording: Recording, signal: Signal) -> tuple[np.ndarray, l
 def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
     """Autocovariance (lags,) of values (n,) with mean 0, NaN counting as 0. It is positive definite, as interpolation
     needs."""
-    there = np.nan_to_num(values)
-    size = 1 << (2 * len(there) - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(there, size)) ** 2
-    law = np.fft.irfft(spectrum, size)[: min(lags, len(there))] / np.count_nonzero(~np.isnan(values))
-    return np.pad(law, (0, max(lags - len(there), 0)))
+    known = np.nan_to_num(values)
+    size = 1 << (2 * len(known) - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(known, size)) ** 2
+    law = np.fft.irfft(spectrum, size)[: min(lags, len(known))] / np.count_nonzero(~np.isnan(values))
+    return np.pad(law, (0, max(lags - len(known), 0)))
 
 
-def _neighbour_samples(values: np.ndarray, first: int, end: int, span: int, every: int) -> np.ndarray:
-    """Indices of measured samples around a gap: all of the nearest ones, and every ``every``-th of those farther
+def _neighbour_samples(values: np.ndarray, first: int, end: int, span: int, stride: int) -> np.ndarray:
+    """Indices of measured samples around a gap: all of the nearest ones, and every ``stride``-th of those farther
     away."""
-    near = np.arange(1, span + 1)
-    near = near[(near <= 2 * (end - first) + 8) | (near % every == 0)]
-    around = np.concatenate((first - near[::-1], end - 1 + near))
-    around = around[(around >= 0) & (around < len(values))]
-    return around[~np.isnan(values[around])]
+    distances = np.arange(1, span + 1)
+    distances = distances[(distances <= 2 * (end - first) + 8) | (distances % stride == 0)]
+    indices = np.concatenate((first - distances[::-1], end - 1 + distances))
+    indices = indices[(indices >= 0) & (indices < len(values))]
+    return indices[~np.isnan(values[indices])]
 
 
 def _conditional_mean(
@@ -131,12 +131,12 @@ def _conditional_mean(
 ) -> tuple[np.ndarray, float]:
     """Expected values (m,) of the lost samples given the known ones, and the largest standard deviation of the
     estimate."""
-    among = law[np.abs(known_samples[:, None] - known_samples)]
-    among[np.diag_indices(len(known_samples))] *= 1 + 1e-9
-    between = law[np.abs(lost[:, None] - known_samples)]
-    weights = np.linalg.solve(among, between.T)
-    left = law[0] - np.sum(between.T * weights, axis=0)
-    return values @ weights, float(np.sqrt(np.maximum(left, 0.0).max()))
+    known_covariance = law[np.abs(known_samples[:, None] - known_samples)]
+    known_covariance[np.diag_indices(len(known_samples))] *= 1 + 1e-9
+    cross_covariance = law[np.abs(lost[:, None] - known_samples)]
+    weights = np.linalg.solve(known_covariance, cross_covariance.T)
+    remaining_variance = law[0] - np.sum(cross_covariance.T * weights, axis=0)
+    return values @ weights, float(np.sqrt(np.maximum(remaining_variance, 0.0).max()))
 
 
 def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, Finding | None]:
@@ -149,19 +149,19 @@ def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tup
     if not (np.abs(values) > LARGEST_PLAUSIBLE[signal.quantity]).any():
         return values, None
     absurd = ~(np.abs(values) < MISSING_VALUE_MARK) & ~np.isnan(values)
-    good = values[~absurd & ~np.isnan(values)]
-    if len(good):
-        away = np.abs(good - np.median(good))
-        far = np.maximum(FAR_RATIO * np.median(away), LARGEST_PLAUSIBLE[signal.quantity])
-        absurd[np.flatnonzero(~absurd & ~np.isnan(values))[away > far]] = True
+    plausible = values[~absurd & ~np.isnan(values)]
+    if len(plausible):
+        deviations = np.abs(plausible - np.median(plausible))
+        limit = np.maximum(FAR_RATIO * np.median(deviations), LARGEST_PLAUSIBLE[signal.quantity])
+        absurd[np.flatnonzero(~absurd & ~np.isnan(values))[deviations > limit]] = True
     if not absurd.any():
         return values, None
     stretches, count = true_runs(absurd), int(absurd.sum())
     first, last = stretches[0, 0], stretches[-1, 1] - 1
     written = values[first] / (signal.sign * signal.factor) + signal.zero
-    many = f"{count} samples in {len(stretches)} stretch(es) are" if count > 1 else "a sample is"
+    count_text = f"{count} samples in {len(stretches)} stretch(es) are" if count > 1 else "a sample is"
     text = (
-        f"{signal.file}, {signal.channel}: {many} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
+        f"{signal.file}, {signal.channel}: {count_text} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
         + f" at {times[first]:.6g} s is an exporter's mark for no value, or a spike of the telemetry. Such samples "
         "are taken as not measured."
     )

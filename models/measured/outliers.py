@@ -11,13 +11,13 @@ FAR_RATIO, USUAL_SHARE = 3.0, 0.99
 def without_outliers(values: np.ndarray) -> np.ndarray:
     """Values (n,) with NaN in place of those farther from the running median than noise explains; NaN stays NaN."""
     known = np.flatnonzero(np.isfinite(values))
-    kept = values.astype(float, copy=True)
+    cleaned = values.astype(float, copy=True)
     if len(known) <= MEDIAN_SAMPLES:
-        return kept
+        return cleaned
     from scipy.ndimage import median_filter
 
-    off = np.abs(values[known] - median_filter(values[known], MEDIAN_SAMPLES, mode="nearest"))
-    usual = float(np.quantile(off, USUAL_SHARE))
+    distances = np.abs(values[known] - median_filter(values[known], MEDIAN_SAMPLES, mode="nearest"))
+    usual = float(np.quantile(distances, USUAL_SHARE))
     if usual > 0.0:
-        kept[known[off > FAR_RATIO * usual]] = np.nan
-    return kept
+        cleaned[known[distances > FAR_RATIO * usual]] = np.nan
+    return cleaned

@@ -38,7 +38,7 @@ def _unknown_points(times: np.ndarray, source_period: float, grid: np.ndarray) -
 
 
 def _decimated_values(
-    times: np.ndarray, values: np.ndarray, source_period: float, new: float, grid: np.ndarray
+    times: np.ndarray, values: np.ndarray, source_period: float, new_period: float, grid: np.ndarray
 ) -> np.ndarray:
     """Values filtered by a symmetric low-pass kernel, which adds no phase, then interpolated by a cubic spline, which
     is accurate enough at that sampling rate."""
@@ -47,7 +47,7 @@ def _decimated_values(
 
     count = round((times[-1] - times[0]) / source_period) + 1
     even = times[0] + source_period * np.arange(count)
-    nyquist, rate = 0.5 / source_period, 1.0 / new
+    nyquist, rate = 0.5 / source_period, 1.0 / new_period
     taps, beta = kaiserord(STOP_ATTENUATION, (STOP_BAND - PASS_BAND) * rate / nyquist)
     kernel = firwin(taps | 1, 0.5 * (PASS_BAND + STOP_BAND) * rate, window=("kaiser", beta), fs=2.0 * nyquist)
     reach = min(len(kernel) // 2, count - 1)

@@ -79,17 +79,21 @@ def _on_grid(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The run's values (n,), the measurement's values (m,), and whether they were measured (m,), on even time grids
     that begin at the two starts (s)."""
-    grid, ours, measured = (
+    grid, run_grid, measured = (
         _even_grid(channel_pair.times, begin, step),
         _even_grid(channel_pair.run_times, first, step),
         np.isfinite(channel_pair.values),
     )
-    there = np.interp(grid, channel_pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
+    is_measured = np.interp(grid, channel_pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
     values = np.interp(grid, channel_pair.times[measured], channel_pair.values[measured])
-    return np.interp(ours, channel_pair.run_times, channel_pair.run), np.where(there, values, 0.0), there
+    return (
+        np.interp(run_grid, channel_pair.run_times, channel_pair.run),
+        np.where(is_measured, values, 0.0),
+        is_measured,
+    )
 
 
-def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> np.ndarray:
+def _correlations(run: np.ndarray, measured: np.ndarray, is_measured: np.ndarray) -> np.ndarray:
     """Correlation (n + m - 1,) of run and measurement at every lag, the first being 1 - n; -1 where they overlap too
     little."""
     from scipy.signal import correlate
@@ -97,8 +101,8 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
     def over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return correlate(a, b, mode="full", method="fft")
 
-    x, mask = (run - run.mean()) / run.std(), there.astype(float)
-    y = np.where(there, measured - measured[there].mean(), 0.0) / measured[there].std()
+    x, mask = (run - run.mean()) / run.std(), is_measured.astype(float)
+    y = np.where(is_measured, measured - measured[is_measured].mean(), 0.0) / measured[is_measured].std()
     ones, count = np.ones(len(x)), over(mask, np.ones(len(x)))
     sums, means = over(mask, x), over(y, ones)
     safe = np.maximum(count, 1.0)

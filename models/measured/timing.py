@@ -60,16 +60,16 @@ class Timing:
 def sample_timing(times: np.ndarray, place: str, signal_names: tuple[str, ...] = ()) -> Timing:
     """Times of samples (n,) given in the order of the file at ``place``; InputError where fewer than two times
     differ."""
-    wrong = _no_times(times)
-    if wrong.any():
-        kept, first = sample_timing(times[~wrong], place, signal_names), int(np.argmax(wrong))
+    has_no_time = _no_times(times)
+    if has_no_time.any():
+        timing, first = sample_timing(times[~has_no_time], place, signal_names), int(np.argmax(has_no_time))
         text = (
-            f"{place}: {np.count_nonzero(wrong)} samples have no time, the first is number {first + 1} with "
+            f"{place}: {np.count_nonzero(has_no_time)} samples have no time, the first is number {first + 1} with "
             f"{times[first]:.4g} s; they are left out."
         )
-        order = np.flatnonzero(~wrong) if kept.order is None else np.flatnonzero(~wrong)[kept.order]
-        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(wrong)), "samples", signal_names)
-        return replace(kept, order=order, findings=(absurd, *kept.findings))
+        order = np.flatnonzero(~has_no_time) if timing.order is None else np.flatnonzero(~has_no_time)[timing.order]
+        absurd = Finding("time", "doubt", place, text, float(np.count_nonzero(has_no_time)), "samples", signal_names)
+        return replace(timing, order=order, findings=(absurd, *timing.findings))
     return _of_times(times, place, signal_names)
 
 
@@ -80,37 +80,38 @@ def _no_times(times: np.ndarray) -> np.ndarray:
         return ~finite
     length = len(times) * float(np.median(np.abs(np.diff(times[finite]))))
     with np.errstate(invalid="ignore"):
-        far = np.abs(times - np.median(times[finite])) > LARGEST_TIME_RATIO * length
-    return ~finite | (far if length > 0 else False)
+        is_far = np.abs(times - np.median(times[finite])) > LARGEST_TIME_RATIO * length
+    return ~finite | (is_far if length > 0 else False)
 
 
 def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> Timing:
     """``Timing`` from values that can be times."""
-    findings, whole = list[Finding](), len(times)
+    findings, sample_count = list[Finding](), len(times)
 
     def say(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
         findings.append(
             Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
         )
 
-    keep, order = np.arange(whole), None
+    keep, order = np.arange(sample_count), None
     steps = np.diff(times)
     rising = steps[steps > 0]
     if not len(rising):
         raise InputError(place, "time", None, "two samples or more at different times are needed")
     even = even_clock(times)
     if even is not None:
-        same = whole - 1 - len(rising)
+        repeated_count = sample_count - 1 - len(rising)
+        repeated_text = f", so that {repeated_count} of {sample_count} repeat themselves" if repeated_count else ""
         say(
             "time",
             "note",
-            f"the times are rounded{f', so that {same} of {whole} repeat themselves' if same else ''}: "
-            f"an even clock of {1 / even[1]:.9g} Hz explains them all, and is taken with all {whole} samples",
-            float(same),
+            f"the times are rounded{repeated_text}: "
+            f"an even clock of {1 / even[1]:.9g} Hz explains them all, and is taken with all {sample_count} samples",
+            float(repeated_count),
             "samples",
             (times[0], times[-1]),
         )
-        return Timing(even[0] + even[1] * np.arange(whole), None, even[1], tuple(findings))
+        return Timing(even[0] + even[1] * np.arange(sample_count), None, even[1], tuple(findings))
     period = float(f"{_step(times, rising):.9g}")
     if (steps < 0).any():
         deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
@@ -155,10 +156,10 @@ def _of_times(times: np.ndarray, place: str, signal_names: tuple[str, ...]) -> T
             say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~repeated))]
         order = keep
-    kept = times[keep]
-    _report_gaps(kept, period, say)
-    _report_jitter(kept, period, say)
-    return Timing(kept, order, period, tuple(findings))
+    kept_times = times[keep]
+    _report_gaps(kept_times, period, say)
+    _report_jitter(kept_times, period, say)
+    return Timing(kept_times, order, period, tuple(findings))
 
 
 def _step(times: np.ndarray, rising: np.ndarray) -> float:
@@ -186,9 +187,9 @@ def even_clock(times: np.ndarray) -> tuple[float, float] | None:
         return None
     slope = float(np.polyfit(count - count.mean(), times - times.mean(), 1)[0])
     for period in [*(1 / float(f"{1 / slope:.{digits}g}") for digits in RATE_DIGITS), slope]:
-        off = times - period * count
-        if np.ptp(off) <= width * (1 + 1e-6):
-            return float(0.5 * (off.min() + off.max())), period
+        residuals = times - period * count
+        if np.ptp(residuals) <= width * (1 + 1e-6):
+            return float(0.5 * (residuals.min() + residuals.max())), period
     return None
 
 
@@ -204,8 +205,8 @@ def _rounding_spacing(times: np.ndarray) -> float | None:
     if (steps == 0).any() or np.count_nonzero(np.abs(steps - middle) > EVEN_CLOCK_SHARE * middle) < LEAST_SLIPS:
         return None
     for digits in range(7):
-        whole = times * 10.0**digits
-        if (np.abs(whole - np.rint(whole)) < 1e-6).all():
+        scaled_times = times * 10.0**digits
+        if (np.abs(scaled_times - np.rint(scaled_times)) < 1e-6).all():
             return 10.0**-digits if 10.0**-digits > EVEN_CLOCK_SHARE * middle else None
     return None
 

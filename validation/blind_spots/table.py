@@ -22,9 +22,14 @@ from validation.blind_spots.shared import compiled_functions
 
 TABLE_FILE = Path(__file__).with_name("blind_spots.csv")
 HARMLESS_FILE = Path(__file__).with_name("harmless.csv")
-WHY_HARMLESS = ("harmless, as they change cost alone", "harmless, without a number of their own")
+WHY_HARMLESS = (
+    "harmless, as they change cost alone",
+    "harmless, without a number of their own",
+    "harmless, as they give whole numbers alone",
+)
 """Why a fault changes no value: it moves a starting point or a step of a search, whose end stays within the stated
-error; or the function gives views of its arguments, new arrays that are written over, zeros, or nothing."""
+error; or the function gives views of its arguments, new arrays that are written over, zeros, or nothing; or it selects,
+by arrays of zeros and ones, which are not spoiled."""
 INDEPENDENT_GROUNDS = ("closed form", "published", "native", "written equations", "plain counterpart")
 CHECKS_OF_CHECKS = "planted."
 LIST_SEPARATOR = "; "

@@ -109,7 +109,7 @@ class Agreement:
         return np.einsum("fkc,fkc->fk", self._expected_times_forces, self.response.conj()).real
 
     @property
-    def left(self) -> np.ndarray:
+    def residual_powers(self) -> np.ndarray:
         """Powers (f, k) of the residual: the measured readings less the prediction."""
         shared = np.einsum("fkc,fkc->fk", self.between, self.response.conj()).real
         return np.maximum(self.readings - 2 * shared + self.predicted_powers, 0.0)
@@ -118,7 +118,9 @@ class Agreement:
     def unexplained(self) -> np.ndarray:
         """Square root (k,) of the share of each reading's power, without noise, that the forces do not explain."""
         noise = len(self.frequencies) * self.noise
-        share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT)
+        share = (self.residual_powers.sum(axis=0) - noise) / np.maximum(
+            self.readings.sum(axis=0) - noise, noise + SMALLEST_FLOAT
+        )
         return np.sqrt(np.maximum(share, 0.0))
 
     def median_unexplained(self) -> float:
@@ -136,28 +138,28 @@ class Agreement:
         counts little."""
         kernel = np.ones(SMOOTHED_LINES) / SMOOTHED_LINES
         known = VEHICLE_ERROR**2 * np.maximum(self.predicted_powers, 1e-3 * self.predicted_powers.mean(axis=0))
-        padded = np.pad(self.left + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
+        padded = np.pad(self.residual_powers + known, ((SMOOTHED_LINES // 2, SMOOTHED_LINES // 2), (0, 0)), mode="edge")
         smooth = [np.convolve(row, kernel, "valid") for row in padded.T]
         return self.independent_averages / np.maximum(np.stack(smooth, axis=1), SMALLEST_FLOAT)
 
     def search(self) -> tuple["Agreement", tuple[MeasurementFault, ...]]:
         """The ``Agreement`` after the faults found are corrected, and these faults, the worst one first."""
-        now, faults = self, list[MeasurementFault]()
+        agreement, faults = self, list[MeasurementFault]()
         while len(faults) < MOST_FAULTS:
-            worst = max(now._explaining_faults(), key=lambda fault: fault.chi_square_fall, default=None)
-            if worst is None:
+            worst_fault = max(agreement._explaining_faults(), key=lambda fault: fault.chi_square_fall, default=None)
+            if worst_fault is None:
                 break
-            faults.append(worst)
-            now = now.without(worst)
-        return now, tuple(faults)
+            faults.append(worst_fault)
+            agreement = agreement.without(worst_fault)
+        return agreement, tuple(faults)
 
     def without(self, fault: MeasurementFault) -> "Agreement":
         """The agreement after a fault is corrected. The response is divided by the fault of a force, or multiplied by
         the fault of a reading."""
         response = self.response.copy()
         if fault.kind == "swapped":
-            to = dict(fault.exchanged_hubs)
-            order = [self.places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
+            target_hub = dict(fault.exchanged_hubs)
+            order = [self.places[target_hub.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
             return replace(self, response=response[:, :, order])
         if fault.kind == "crossed":
             return self._with_channels_exchanged(fault.signals)
@@ -165,9 +167,9 @@ class Agreement:
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
             return replace(self, response=response + fault.size * self._height_derivatives(hubs))
         turn = 2j * np.pi * self.frequencies
-        wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
+        fault_factor = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
         forces, index = self._indices_of(fault.signals)
-        response[index] *= (1 / wrong if forces else wrong)[:, None, None]
+        response[index] *= (1 / fault_factor if forces else fault_factor)[:, None, None]
         return replace(self, response=response)
 
     def _indices_of(self, signals: tuple[Signal, ...]) -> tuple[bool, Any]:
@@ -218,9 +220,9 @@ class Agreement:
         the latter."""
         pick = list(group.members)
         if group.forces:
-            response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
-            rest = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ among
-            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power_spectrum(response, among)
+            response, group_forces = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
+            remainder = self.between[:, :, pick] - self._expected_times_forces[:, :, pick] + response @ group_forces
+            return np.einsum("fkc,fkc->fk", remainder, response.conj()), _power_spectrum(response, group_forces)
         cross, power = np.zeros((2, *self.readings.shape), complex)
         response = self.response[:, pick]
         cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
@@ -289,14 +291,14 @@ class Agreement:
         """Faults in which hubs have exchanged their channels: two hubs, or two pairs of hubs."""
         pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
-        before = float((weights * self.left).sum())
+        chi_square = float((weights * self.residual_powers).sum())
         for exchanged in (*((pair,) for pair in pairs), *twice):
             fault = self._exchange_fault(exchanged)
             if fault is not None:
-                other = self.without(fault)
-                fall = before - float((weights * other.left).sum())
-                if fall > CHI_SQUARE_FALL and other.left.sum() < self.left.sum():
-                    yield replace(fault, size=self.rms, error=other.rms, chi_square_fall=fall)
+                corrected = self.without(fault)
+                fall = chi_square - float((weights * corrected.residual_powers).sum())
+                if fall > CHI_SQUARE_FALL and corrected.residual_powers.sum() < self.residual_powers.sum():
+                    yield replace(fault, size=self.rms, error=corrected.rms, chi_square_fall=fall)
 
     def _exchanged_channel_faults(self, weights: np.ndarray) -> Iterator[MeasurementFault]:
         """Pairs of channels whose signals may be exchanged with each other."""
@@ -326,7 +328,7 @@ class Agreement:
     def _certain_improvement(self, corrected: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this agreement to the corrected one; 0 if it is not significant, or too small to be
         named."""
-        fall = float((weights * (self.left - corrected.left)).sum())
+        fall = float((weights * (self.residual_powers - corrected.residual_powers)).sum())
         return fall if fall > CHI_SQUARE_FALL and self._is_worth_correcting(corrected, weights) else 0.0
 
     def _with_channels_exchanged(self, channel_pair: tuple[Signal, ...]) -> "Agreement":
@@ -369,14 +371,14 @@ class Agreement:
 
     def _unexplained_power(self, weights: np.ndarray) -> np.ndarray:
         """Weighted power (k,) of each reading that neither the forces nor noise explain."""
-        return np.maximum((weights * (self.left - self.noise)).sum(axis=0), 0.0)
+        return np.maximum((weights * (self.residual_powers - self.noise)).sum(axis=0), 0.0)
 
     def _is_worth_correcting(self, corrected: "Agreement", weights: np.ndarray) -> bool:
         """Whether a correction removes much of the residual of at least one reading, not merely a little of every
         one."""
         return bool(
             np.any(
-                ((self.left - corrected.left) * weights).sum(axis=0)
+                ((self.residual_powers - corrected.residual_powers) * weights).sum(axis=0)
                 > EXPLAINED_SHARE * self._unexplained_power(weights)
             )
         )
@@ -385,19 +387,19 @@ class Agreement:
         return tuple((self.inputs if group.forces else self.outputs)[i] for i in group.members)
 
 
-def _smallest_certain_size(power: np.ndarray, rest: np.ndarray, small: float) -> float:
+def _smallest_certain_size(power: np.ndarray, residual: np.ndarray, least_size: float) -> float:
     """Smallest significant and noteworthy size of a fault, if each reading's residual (k,) falls by ``power`` times
     size^2."""
     if not power.sum() > 0:
         return float("inf")
-    return max(small, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((rest / power) ** 0.5)))
+    return max(least_size, float((CHI_SQUARE_FALL / power.sum()) ** 0.5), float(np.nanmin((residual / power) ** 0.5)))
 
 
 def _power_spectrum(response: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return np.einsum("fkc,fkc->fk", response @ forces, response.conj()).real
 
 
-def _parabola_vertex(left: float, middle_value: float, right: float) -> float:
+def _parabola_vertex(value_before: float, value_between: float, value_after: float) -> float:
     """Position of the vertex of the parabola through three values at -1, 0 and 1."""
-    bend = left - 2 * middle_value + right
-    return 0.5 * (left - right) / bend if bend < 0 else 0.0
+    bend = value_before - 2 * value_between + value_after
+    return 0.5 * (value_before - value_after) / bend if bend < 0 else 0.0

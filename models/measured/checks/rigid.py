@@ -46,23 +46,23 @@ def _body_finding(evidence: Evidence, body: str, sensors: dict[str, tuple[Transd
     except InputError as error:
         return Finding(NAME, "note", body, f"Not looked at whether {body} is rigid: {error}.")
     recording, axes = evidence.recording, [axes for _, axes in sensors.values()]
-    signals, every = [s for triple in axes for s in triple], -(-recording.count // MOST_SAMPLES)
-    columns = [[recording.samples(s)[::every] for s in triple] for triple in axes]
+    signals, stride = [s for triple in axes for s in triple], -(-recording.count // MOST_SAMPLES)
+    columns = [[recording.samples(s)[::stride] for s in triple] for triple in axes]
     readings = np.moveaxis(np.array(columns), 2, 0)
     sizes = [noise(recording, s) for s in signals]
     deviation = float(np.sqrt(np.nanmean(np.square(sizes)))) if np.isfinite(sizes).any() else 0.0
     rigidity = fit_quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
     if rigidity.rigid is None:
         return Finding(NAME, "note", body, f"{body}: {array.describe()[-1]}; a fourth sensor would tell.")
-    left = f"{100 * rigidity.share:.2g} % of what its {len(axes)} accelerometers read against each other"
+    share_text = f"{100 * rigidity.share:.2g} % of what its {len(axes)} accelerometers read against each other"
     size, names = 100 * rigidity.share, tuple(s.name for s in signals)
     if rigidity.rigid:
-        text = f"A rigid body explains {body} but for {left}."
+        text = f"A rigid body explains {body} but for {share_text}."
         return Finding(NAME, "note", body, text, size, "%", names)
     cause = (
         f"without {rigidity.suspect} it is rigid: check its mount, place, axes and factor"
         if rigidity.suspect
         else "no single sensor explains it: check places and axes of all"
     )
-    text = f"No rigid body explains {left} on {body}; {cause}."
+    text = f"No rigid body explains {share_text} on {body}; {cause}."
     return Finding(NAME, "doubt", rigidity.suspect or body, text, size, "%", names)

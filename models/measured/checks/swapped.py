@@ -58,23 +58,23 @@ def _indistinguishable_hubs(evidence: Evidence) -> Finding:
 def _remaining_disagreement(evidence: Evidence) -> Finding:
     """Finding on the disagreement of forces and motion that remains after all faults are corrected."""
     assert evidence.agreement_and_faults is not None
-    left = evidence.agreement_and_faults[0]
-    share = left.unexplained
+    agreement = evidence.agreement_and_faults[0]
+    share = agreement.unexplained
     low, high = int(share.argmin()), int(share.argmax())
-    best, worst = (f"{100 * share[i]:.2g} % ({left.outputs[i].name})" for i in (low, high))
+    best, worst = (f"{100 * share[i]:.2g} % ({agreement.outputs[i].name})" for i in (low, high))
     text = (
         f"Through the vehicle file the hub forces explain the inertial channels but for {best} to {worst} of their "
-        f"size between {left.frequencies[0]:.3g} and {left.frequencies[-1]:.3g} Hz"
+        f"size between {agreement.frequencies[0]:.3g} and {agreement.frequencies[-1]:.3g} Hz"
     )
-    told, resolved = left.median_unexplained(), float(left.frequencies[1] - left.frequencies[0])
-    if told <= LARGEST_UNEXPLAINED:
-        return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
-    if told <= LARGEST_UNEXPLAINED * SEGMENT_LENGTH * resolved:
+    median_share, resolved = agreement.median_unexplained(), float(agreement.frequencies[1] - agreement.frequencies[0])
+    if median_share <= LARGEST_UNEXPLAINED:
+        return Finding(NAME, "note", "", f"{text}.", 100 * median_share, "%")
+    if median_share <= LARGEST_UNEXPLAINED * SEGMENT_LENGTH * resolved:
         text += f". Segments of {1 / resolved:.3g} s are too short to say whether they belong together"
-        return Finding(NAME, "note", "", f"{text}.", 100 * told, "%")
+        return Finding(NAME, "note", "", f"{text}.", 100 * median_share, "%")
     text += (
-        f"; typically {100 * told:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
+        f"; typically {100 * median_share:.0f} % stay unexplained: forces, motion and vehicle do not belong together, "
         "so that delays and factors are not to be relied upon, and true ones may be hidden. Check frame, clocks, "
         "places of the sensors and the vehicle file."
     )
-    return Finding(NAME, "doubt", "", text, 100 * told, "%", tuple(s.name for s in left.outputs))
+    return Finding(NAME, "doubt", "", text, 100 * median_share, "%", tuple(s.name for s in agreement.outputs))

@@ -37,7 +37,7 @@ class Balance:
     elasticity alone. columns (e, h) : residual that an excess of one whole load at a hub would cause. inverse (e, e) :
     of the covariance of the residual."""
 
-    left: np.ndarray
+    residual: np.ndarray
     columns: np.ndarray
     inverse: np.ndarray
 
@@ -45,7 +45,7 @@ class Balance:
         """Fit columns (e, p) to the residual by generalised least squares: their shares (p,), the covariance of these,
         and the fall of chi square."""
         normal = columns.T @ self.inverse @ columns
-        share = np.linalg.solve(normal, columns.T @ self.inverse @ self.left)
+        share = np.linalg.solve(normal, columns.T @ self.inverse @ self.residual)
         return share, np.linalg.inv(normal), float(share @ normal @ share)
 
 
@@ -61,11 +61,11 @@ def check(evidence: Evidence) -> list[Finding]:
         return [Finding(NAME, "note", "", text)]
     signals = tuple(of_hub[hub] for hub in vehicle.hubs)
     numbers, means = _component_numbers(evidence, vehicle), windowed_means(_force_columns(evidence, vehicle))
-    loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
-    coarse = [_wrong_sign_or_unit(evidence, *each) for each in zip(signals, loads, at, strict=True)]
+    loads, static_loads = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
+    coarse = [_wrong_sign_or_unit(evidence, *each) for each in zip(signals, loads, static_loads, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
-    return [_single_channel_error(evidence, _balance_of_means(vehicle, numbers, *means), signals, at)]
+    return [_single_channel_error(evidence, _balance_of_means(vehicle, numbers, *means), signals, static_loads)]
 
 
 def mean_hub_moments(evidence: Evidence) -> np.ndarray:
@@ -78,8 +78,8 @@ def mean_hub_moments(evidence: Evidence) -> np.ndarray:
     balanced = _balance_of_means(
         vehicle, _component_numbers(evidence, vehicle), *windowed_means(_force_columns(evidence, vehicle))
     )
-    left, sure = balanced.left[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
-    return left if (np.abs(left) > MOMENT_STANDARD_DEVIATIONS * sure).any() else none
+    residual, deviations = balanced.residual[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
+    return residual if (np.abs(residual) > MOMENT_STANDARD_DEVIATIONS * deviations).any() else none
 
 
 def _force_columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
@@ -143,7 +143,7 @@ def _single_channel_error(
     names, weight = tuple(s.name for s in signals), float(loads.sum())
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
-    force, error, fall = balance.fit(np.eye(len(balance.left))[:, :3])
+    force, error, fall = balance.fit(np.eye(len(balance.residual))[:, :3])
     sure = [float(uncertainty[0, 0]) ** 0.5 for _, uncertainty, _ in single]
     share, uncertainty = float(single[worst][0][0]), sure[worst]
     excess, known = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight

@@ -138,24 +138,24 @@ def unit_of(text: str) -> str:
     return bracketed[1].strip() if quantities_of_unit(bracketed[1]) else ""
 
 
-def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
+def _findings_on_end(path: Path, layout: Layout, remarks: Remarks, count: int, byte_count_left: int) -> list[Finding]:
     """Findings on whether the file ends as a complete file does."""
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
-    said, samples = list[Finding](), remarks.samples
-    if left:
+    findings, samples = list[Finding](), remarks.samples
+    if byte_count_left:
         with path.open("rb") as file:
-            file.seek(-left, io.SEEK_END)
-            whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
-        ends = "may be" if whole else "is"
+            file.seek(-byte_count_left, io.SEEK_END)
+            is_whole = one_byte_text(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
+        ends = "may be" if is_whole else "is"
         text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
-        said.append(flaw_finding(path, "note" if whole else "doubt", text))
+        findings.append(flaw_finding(path, "note" if is_whole else "doubt", text))
     if samples is not None and samples > count:
         text = f"the header announces {samples} rows, but {count} are there: the file is cut off"
-        said.append(flaw_finding(path, "doubt", text))
+        findings.append(flaw_finding(path, "doubt", text))
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
-    return said
+    return findings
 
 
 def _factor_to_seconds(path: Path, header: TableHead, clock: int, unit: str) -> float:

@@ -109,12 +109,14 @@ def _record_block(mdf: Any, group: int, indices: list[int], first: int, count: i
     """Times and values of some records, loaded only once; the library's public functions would load them again for each
     channel."""
     getattr(mdf._mdf, "_invalidation_cache", {}).clear()  # it knows a block by its length, and takes the one before
-    parts = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
+    data_blocks = list(mdf._mdf._load_data(mdf.groups[group], record_offset=first, record_count=count))
     unit = mdf.groups[group].channels[mdf.masters_db[group]].unit or ""
     times = SECONDS_OF_UNIT.get(unit.strip(), 1.0) * np.concatenate(
-        [mdf.get_master(group, data=part) for part in parts]
+        [mdf.get_master(group, data=data_block) for data_block in data_blocks]
     )
-    values = [np.concatenate([_physical_values(mdf, group, i, part) for part in parts]) for i in indices]
+    values = [
+        np.concatenate([_physical_values(mdf, group, i, data_block) for data_block in data_blocks]) for i in indices
+    ]
     return times[:count], np.column_stack(values)[:count]
 
 
@@ -143,7 +145,7 @@ def open_mdf(path: Path) -> MdfFile:
 
 def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
     """Channels that hold numbers over time."""
-    left, places, channels = LeftOut(), [], []
+    left_out, locations, channels = LeftOut(), [], []
     for g, group in enumerate(mdf.groups):
         records = group.channel_group
         if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
@@ -152,22 +154,22 @@ def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Findi
             )
         why = _why_group_unusable(mdf, g, version)
         if why:
-            left.add(why, f"group {g + 1}")
+            left_out.add(why, f"group {g + 1}")
             continue
         for i, channel in enumerate(group.channels):
             if i == mdf.masters_db.get(g):
                 continue
             why = _why_channel_unusable(group, i, version)
             if why:
-                left.add(why, repr(channel.name))
+                left_out.add(why, repr(channel.name))
             else:
-                places.append((g, i))
+                locations.append((g, i))
                 channels.append(channel)
-    findings = findings + left.findings(path)
-    if not places:
+    findings = findings + left_out.findings(path)
+    if not locations:
         raise without_numbers(path, findings)
     groups = [
-        _group_names(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)
+        _group_names(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, locations, strict=True)
     ]
     names, repeated = distinct_names(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
@@ -181,11 +183,11 @@ def _file_with_channels(path: Path, mdf: Any, version: int, findings: list[Findi
             _value_step(channel, version),
             next(filter(None, texts), ""),
         )
-        for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
+        for name, channel, (g, _), texts in zip(names, channels, locations, groups, strict=True)
     )
     start, notes = _start_time(path, mdf.header, version)
     return MdfFile(
-        path, listed, start, _plain_comment(mdf.header.comment), tuple(findings + repeated + notes), tuple(places)
+        path, listed, start, _plain_comment(mdf.header.comment), tuple(findings + repeated + notes), tuple(locations)
     )
 
 
@@ -279,6 +281,6 @@ def _start_time(path: Path, header: Any, version: int) -> tuple[datetime | None,
     minutes = 60 * header.tz_offset if version == 3 else 0
     if version == 4 and header.time_flags & OFFSET_VALID_FLAG:
         minutes = header.tz_offset + header.daylight_save_time
-    whole, part = divmod(header.abs_time, 10**9)
+    seconds, nanoseconds = divmod(header.abs_time, 10**9)
     zone = timezone(timedelta(minutes=minutes))
-    return datetime.fromtimestamp(whole, zone) + timedelta(microseconds=part // 1000), []
+    return datetime.fromtimestamp(seconds, zone) + timedelta(microseconds=nanoseconds // 1000), []

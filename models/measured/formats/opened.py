@@ -133,20 +133,20 @@ def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> 
     A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that
     tells all its channels apart, and ``Fz (1)``, ``Fz (2)`` where none does.
     """
-    by_group, said = list(names), list[Finding]()
+    by_group, findings = list(names), list[Finding]()
     repeated = {
         name: [i for i, each in enumerate(names) if each == name] for name, n in Counter(names).items() if n > 1
     }
-    for name, places in repeated.items():
-        for group in [texts for texts in groups if len({texts[i] for i in places}) == len(places)][:1]:
-            for i in places:
+    for name, indices in repeated.items():
+        for group in [texts for texts in groups if len({texts[i] for i in indices}) == len(indices)][:1]:
+            for i in indices:
                 by_group[i] = f"{group[i]}/{name}" if group[i] else name
     unique = _number_repeated(by_group)
-    for name, places in repeated.items():
-        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in places) else "note"
-        text = f"{len(places)} channels are called {name!r}: they are read as "
-        said.append(flaw_finding(path, weight, text + ", ".join(repr(unique[i]) for i in places), name))
-    return unique, said
+    for name, indices in repeated.items():
+        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in indices) else "note"
+        text = f"{len(indices)} channels are called {name!r}: they are read as "
+        findings.append(flaw_finding(path, weight, text + ", ".join(repr(unique[i]) for i in indices), name))
+    return unique, findings
 
 
 def _number_repeated(names: Sequence[str]) -> list[str]:
@@ -166,9 +166,9 @@ def start_with_zone(path: Path, text: str) -> tuple[datetime | None, list[Findin
     try:
         start = datetime.fromisoformat(text.strip())
     except ValueError:
-        wrong = f"is not a date such as {START_EXAMPLE}, and is not used"
+        reason = f"is not a date such as {START_EXAMPLE}, and is not used"
     else:
         if start.tzinfo is not None:
             return start, []
-        wrong = f"names no time zone, and is not used: write it as {START_EXAMPLE}"
-    return None, [flaw_finding(path, "doubt", f"the start {text.strip()!r} {wrong}")]
+        reason = f"names no time zone, and is not used: write it as {START_EXAMPLE}"
+    return None, [flaw_finding(path, "doubt", f"the start {text.strip()!r} {reason}")]

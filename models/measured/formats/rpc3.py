@@ -181,7 +181,7 @@ def _usable_samples(path: Path, parameters: dict[str, str], layout: Layout) -> t
     announced = frame * whole_number(path, parameters, "FRAMES", 10**12)
     size = layout.points * layout.width * layout.dtype.itemsize
     data = path.stat().st_size - layout.begin
-    there = layout.points * (data // size)
+    present = layout.points * (data // size)
     texts = list[str]()
     if "SAMPLES" in parameters:
         announced = whole_number(path, parameters, "SAMPLES", announced)
@@ -190,7 +190,7 @@ def _usable_samples(path: Path, parameters: dict[str, str], layout: Layout) -> t
             f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "
             "the end may be padding of the last group"
         )
-    count, extra = min(announced, there), data - size * -(-announced // layout.points)
+    count, extra = min(announced, present), data - size * -(-announced // layout.points)
     if count == 0:
         raise InputError(path, f"byte {layout.begin}", None, "the file ends before its first group of samples does")
     if count < announced:

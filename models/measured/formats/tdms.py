@@ -134,19 +134,21 @@ def _cut_off_finding(path: Path, offset: int) -> Finding:
 
 def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     """Channels that hold numbers over time; channels with the same time axis form a group."""
-    left = LeftOut()
-    usable = [(group, channel) for group in data.groups() for channel in group.channels() if _is_numeric(channel, left)]
+    left_out = LeftOut()
+    usable = [
+        (group, channel) for group in data.groups() for channel in group.channels() if _is_numeric(channel, left_out)
+    ]
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
     zero = min((start for _, channel in usable if (start := _start_in_utc(channel)) is not None), default=None)
     with_clock = [
         (channel, place)
         for group, channel in usable
-        if (place := _channel_location(group, channel, zero, left)) is not None
+        if (place := _channel_location(group, channel, zero, left_out)) is not None
     ]
-    said = [*cut, *left.findings(path)]
+    findings = [*cut, *left_out.findings(path)]
     if not with_clock:
-        raise without_numbers(path, said)
+        raise without_numbers(path, findings)
     clocks = [(place.group, place.clock, place.first, place.increment) for _, place in with_clock]
     counts = [len(channel) for channel, _ in with_clock]
     if cut:
@@ -169,7 +171,7 @@ def _file_with_channels(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
         for name, key, (channel, place) in zip(names, keys, with_clock, strict=True)
     )
     comment = str(data.properties.get("description", "")).strip()
-    return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in with_clock))
+    return TdmsData(path, channels, zero, comment, (*findings, *repeated), tuple(place for _, place in with_clock))
 
 
 def _is_numeric(channel: Any, skipped_channels: LeftOut) -> bool:

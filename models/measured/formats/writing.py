@@ -248,16 +248,16 @@ def write_rpc(
 
 def _equal_frames(path: Path, group: ChannelGroup) -> Iterator[np.ndarray]:
     """Values in frames of equal length; the last frame is padded with the last values."""
-    kept = np.empty((0, len(group.names)))
+    pending = np.empty((0, len(group.names)))
     for first, values in group.rows(path):
         if (np.abs(values) > np.finfo("<f4").max).any():
             raise InputError(path, f"sample {first} and after", None, "values above 3.4e38 have no room in RPC III")
-        kept = np.concatenate((kept, values))
-        used = len(kept) // POINTS_PER_GROUP * POINTS_PER_GROUP
-        yield from kept[:used].reshape(-1, POINTS_PER_GROUP, len(group.names))
-        kept = kept[used:]
-    if len(kept):
-        yield np.concatenate((kept, np.repeat(kept[-1:], POINTS_PER_GROUP - len(kept), axis=0)))
+        pending = np.concatenate((pending, values))
+        used = len(pending) // POINTS_PER_GROUP * POINTS_PER_GROUP
+        yield from pending[:used].reshape(-1, POINTS_PER_GROUP, len(group.names))
+        pending = pending[used:]
+    if len(pending):
+        yield np.concatenate((pending, np.repeat(pending[-1:], POINTS_PER_GROUP - len(pending), axis=0)))
 
 
 def _rpc_header(path: Path, group: ChannelGroup, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:

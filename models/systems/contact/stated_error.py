@@ -6,7 +6,7 @@ import numpy as np
 
 from models.contact.accuracy import Error
 from models.contact.theories import LinearTheory, RollingContact
-from models.core.discretisation import Estimate, by_cells, not_estimated, of_theory, with_stated_errors
+from models.core.discretisation import Estimate, by_cells, finite_rms, not_estimated, of_theory, with_stated_errors
 from models.core.result import Result
 from models.systems.contact.scene import ContactScene
 
@@ -48,12 +48,6 @@ def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
         HALVED_CELLS,
     )
     return of_theory(table, {"force": _of_theory(finite_rms(table["error_of_theory"]), force)}, BAND_TEXT)
-
-
-def finite_rms(values: np.ndarray) -> float:
-    """Root mean square of the finite values, 0 if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
 
 def _of_theory(error: float, force: float) -> Estimate:

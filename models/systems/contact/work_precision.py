@@ -20,14 +20,14 @@ from models.contact.linear_theory import coefficients
 from models.contact.material import MaterialPair
 from models.contact.theories import ExactOnEllipse, LinearTheory, Motion, OnEllipse, Simplified
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import by_cells, with_stated_errors
+from models.core.discretisation import by_cells, finite_rms, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
 from models.systems.contact.assumptions import of_pressing
 from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.stated_error import MOST_CELLS, finite_rms
+from models.systems.contact.stated_error import MOST_CELLS
 
 Parts = tuple[float, float, float]
 CREEPAGE_KINDS: dict[str, Parts] = {

@@ -33,39 +33,52 @@ def mapped_signals(scene: MeasuredScene, sources: Sequence[Source], places: Plac
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal_of_entry(scene.file, place, row, source, places, name)
-        for before in mapped:
-            if before.name == signal.name:
+        for earlier in mapped:
+            if earlier.name == signal.name:
                 raise InputError(scene.file, place, row.channel, "is mapped twice: each channel is one signal")
-            same = (before.quantity, before.at, before.component) == (signal.quantity, signal.at, signal.component)
-            if same and not (signal.check or before.check):
-                text = f"measures the same as {before.channel!r}: say check = true of one of them"
+            measures_same = (earlier.quantity, earlier.at, earlier.component) == (
+                signal.quantity,
+                signal.at,
+                signal.component,
+            )
+            if measures_same and not (signal.check or earlier.check):
+                text = f"measures the same as {earlier.channel!r}: say check = true of one of them"
                 raise InputError(scene.file, place, row.channel, text)
         mapped.append(signal)
     frames = {signal.frame: signal for signal in mapped if signal.at in places.hubs and not signal.check}
     if len(frames) > 1:
-        told = ", ".join(f"{signal.channel!r} is in {signal.frame!r}" for signal in [*frames.values()][:2])
-        raise InputError(scene.file, "files", None, f"hub forces must all be in one frame: {told}")
+        examples = ", ".join(f"{signal.channel!r} is in {signal.frame!r}" for signal in [*frames.values()][:2])
+        raise InputError(scene.file, "files", None, f"hub forces must all be in one frame: {examples}")
     return tuple(mapped)
 
 
 def _signal_of_entry(file: str, place: str, row: MappedChannel, source: Source, places: Places, name: str) -> Signal:
     channel, at_hub = find(source, row.channel, file, place), row.at in places.hubs
-    unit, where = row.unit, (file, f"{place}, unit")
+    unit, unit_place = row.unit, (file, f"{place}, unit")
     if unit is None:
-        unit, where = channel.unit.strip(), (source.path.name, f"unit of {row.channel!r}")
+        unit, unit_place = channel.unit.strip(), (source.path.name, f"unit of {row.channel!r}")
         if not unit and row.quantity != "strain":
             missing = f"is missing: {source.path.name} names none of {row.channel!r}"
             raise InputError(file, f"{place}, unit", None, missing)
-    factor = factor_to_si(unit, row.quantity, *where)
+    factor = factor_to_si(unit, row.quantity, *unit_place)
     _check_place(file, place, row, places)
     usual: Frame = "hub" if at_hub else "inertial" if row.quantity == "angle" else "body"
     frame, frames = row.frame or usual, ("hub", "body", "inertial") if at_hub else ("body", "inertial", "sensor")
     if frame not in frames:
         raise InputError(file, f"{place}, frame", frame, f"is no frame of {row.quantity} at {row.at!r}", frames)
     check = row.check or row.quantity == "strain" or row.at in places.connectors
-    what = row.channel, row.quantity, row.at, row.component
+    location = row.channel, row.quantity, row.at, row.component
     return Signal(
-        name, source.path.name, *what, frame, row.sign, unit, factor, zero=row.zero, gravity=row.gravity, check=check
+        name,
+        source.path.name,
+        *location,
+        frame,
+        row.sign,
+        unit,
+        factor,
+        zero=row.zero,
+        gravity=row.gravity,
+        check=check,
     )
 
 
@@ -94,11 +107,11 @@ def _similar_channels(name: str, source: Source) -> str:
 
 def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> None:
     """Refuse a place where the quantity cannot be measured, and a component that the quantity does not have there."""
-    kinds = places.of(row.quantity)
-    every = tuple(name for names in kinds.values() for name in names)
-    if kinds and row.at not in every:
-        known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names)
-        text = f"the vehicle has no such place for {row.quantity} ({known}){suggestion_phrase(row.at, every)}"
+    names_by_kind = places.of(row.quantity)
+    all_names = tuple(name for names in names_by_kind.values() for name in names)
+    if names_by_kind and row.at not in all_names:
+        known = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in names_by_kind.items() if names)
+        text = f"the vehicle has no such place for {row.quantity} ({known}){suggestion_phrase(row.at, all_names)}"
         raise InputError(file, f"{place}, at", row.at, text)
     along = row.at in places.connectors and row.quantity in ("force", "moment")
     axes = () if along else COMPONENTS_OF_QUANTITY[row.quantity]

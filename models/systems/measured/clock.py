@@ -121,9 +121,9 @@ def record_on_clock(
         noticed.append(Finding(**row | {key: tuple(row[key]) for key in ("signals", "times")}))
     began = start + timedelta(seconds=grid.start) if start else None
     comment = "\n".join(source.comment for source in sources if source.comment)
-    said = [finding for source in sources for finding in source.noticed]
-    said += [*noticed, _clock_finding(scene, groups, grid)]
-    return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
+    findings = [finding for source in sources for finding in source.noticed]
+    findings += [*noticed, _clock_finding(scene, groups, grid)]
+    return extended_by_effects(Recording(tuple(signals), columns, grid.period, began, comment, tuple(findings)), scene)
 
 
 def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
@@ -141,15 +141,15 @@ def _moments_at_hubs(scene: MeasuredScene, signals: Sequence[Signal], columns: C
 
 def _clock_finding(scene: MeasuredScene, groups: list[ClockGroup], grid: ClockGrid) -> Finding:
     """A finding on how all channels were brought onto one clock."""
-    ways: dict[str, list[str]] = {}
+    groups_by_method: dict[str, list[str]] = {}
     for group in groups:
         faster = group.timing.period < grid.period * (1 - EQUAL_RATES)
-        way = (
+        method = (
             "as it is" if _is_on_clock(group, grid) else "filtered without phase" if faster else "interpolated linearly"
         )
-        ways.setdefault(way, []).append(f"{group.source.path.name} ({group.timing.rate:.6g} Hz)")
+        groups_by_method.setdefault(method, []).append(f"{group.source.path.name} ({group.timing.rate:.6g} Hz)")
     by, rate = "the scene" if scene.clock.rate else "the wheel forces", 1 / grid.period
-    told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
+    told = "; ".join(f"{method}: {', '.join(dict.fromkeys(names))}" for method, names in groups_by_method.items())
     text = f"The clock is that of {by}, {rate:.6g} Hz, {grid.count} samples; {told}."
     return Finding("clock", "note", "recording", text, rate, "Hz")
 
@@ -170,35 +170,37 @@ def file_shifts(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[f
 
 def _mapped_groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[ClockGroup]:
     """Groups of a file that have mapped channels, with their times shifted to the common time."""
-    of = {channel.name: channel.group for channel in source.channels}
+    group_of_channel = {channel.name: channel.group for channel in source.channels}
     mapped = dict[int, list[Signal]]()
     for signal in (signal for signal in signals if signal.file == source.path.name):
-        mapped.setdefault(of[signal.channel], []).append(signal)
-    for first, *others in mapped.values():
+        mapped.setdefault(group_of_channel[signal.channel], []).append(signal)
+    for first, *other_signals in mapped.values():
         times = np.concatenate([block.times for block in source.blocks([first.channel])])
-        where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {first.channel} ..."
-        clock = sample_timing(times, where, (first.name,))
+        label = (
+            source.path.name if len(set(group_of_channel.values())) == 1 else f"{source.path.name}, {first.channel} ..."
+        )
+        clock = sample_timing(times, label, (first.name,))
         slowed = replace(clock, times=clock.times / (1 + drift) + shift, period=clock.period / (1 + drift))
-        yield ClockGroup(source, (first, *others), slowed)
+        yield ClockGroup(source, (first, *other_signals), slowed)
 
 
 def _of_group(group: ClockGroup) -> Iterator[Finding]:
     """Findings on the times of a group, for example that these seem to be in another unit."""
     yield from group.timing.findings
-    clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
+    clock, label = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
     slowest = min(SLOWEST_SPACING.get(s.quantity, np.inf) for s in group.signals)
     slow = clock.period > slowest
     if not slow and clock.rate < FASTEST_RATE:
         return
     true, written = ("milliseconds", "seconds") if slow else ("seconds", "milliseconds")
     text = (
-        f"{where}: the samples lie {clock.period:.4g} s apart ({clock.rate:.4g} Hz) and last for "
+        f"{label}: the samples lie {clock.period:.4g} s apart ({clock.rate:.4g} Hz) and last for "
         f"{clock.end - clock.times[0]:.4g} s, which is too {'slow' if slow else 'fast'} for "
         f"{group.signals[0].quantity}: "
         f"if its times are in {true}, not in {written}, correct the unit that heads them."
     )
     weight: Weight = "error" if clock.period > 10 * slowest else "doubt"
-    yield Finding("times", weight, where, text, clock.period, "s", (group.signals[0].name,))
+    yield Finding("times", weight, label, text, clock.period, "s", (group.signals[0].name,))
 
 
 def _clock_grid(scene: MeasuredScene, leading: list[ClockGroup]) -> ClockGrid:
@@ -233,16 +235,16 @@ def _check_cover(scene: MeasuredScene, group: ClockGroup, grid: ClockGrid) -> It
     """Report, or refuse, that a group has no data in part of the recording's time."""
     begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
     late, early = begin - grid.start, end - group.timing.end
-    place = f"{name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
+    label = f"{name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
     if max(late, early) >= end - grid.start:
         text = (
-            f"{place} lies wholly outside the wheel forces ({grid.start:.6g} to {end:.6g} s): it runs from "
+            f"{label} lies wholly outside the wheel forces ({grid.start:.6g} to {end:.6g} s): it runs from "
             f"{begin:.6g} to {group.timing.end:.6g} s; set offset"
         )
         raise InputError(scene.file, "files", None, text)
     missing = max(late, 0.0) + max(early, 0.0)
     if missing > 2 * max(grid.period, group.timing.period):
-        text = f"{place} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it."
+        text = f"{label} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it."
         yield Finding("overlap", "doubt", name, text, missing, "s", (group.signals[0].name,))
 
 
@@ -254,24 +256,24 @@ def _recording_columns(
     """
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
     channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
-    now = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}
+    described = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}
     path = folder / SOURCES_FILE
-    if path.is_file() and json.loads(path.read_text()) != now:
+    if path.is_file() and json.loads(path.read_text()) != described:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
-    write_whole(path, json.dumps(now))
+    write_whole(path, json.dumps(described))
     return Columns(folder / COLUMNS_FILE, tuple(signal.name for signal in signals), grid.count)
 
 
 def _is_on_clock(group: ClockGroup, grid: ClockGrid) -> bool:
     """Whether a group was sampled at the recording's own sample times."""
     clock = group.timing
-    at = grid.places(clock.times)
-    inside = (at >= 0) & (at < grid.count)
-    off = np.abs(clock.times[inside] - grid.start - grid.period * at[inside])
+    indices = grid.places(clock.times)
+    inside = (indices >= 0) & (indices < grid.count)
+    deviations = np.abs(clock.times[inside] - grid.start - grid.period * indices[inside])
     return (
         clock.order is None
         and abs(clock.period / grid.period - 1) <= EVEN_CLOCK_SHARE
-        and bool((off <= EVEN_CLOCK_SHARE * grid.period).all())
+        and bool((deviations <= EVEN_CLOCK_SHARE * grid.period).all())
     )
 
 
@@ -284,9 +286,9 @@ def _write_unchanged(group: ClockGroup, grid: ClockGrid, columns: Columns, folde
     def put(last_index: int, indices: np.ndarray, si: np.ndarray) -> None:
         """Write the samples up to ``last_index``: values ``si`` at ``indices``, NaN at the others."""
         for first in range(done, last_index, SAMPLES_PER_BLOCK):
-            here = (indices >= first) & (indices < min(first + SAMPLES_PER_BLOCK, last_index))
+            in_block = (indices >= first) & (indices < min(first + SAMPLES_PER_BLOCK, last_index))
             values = np.full((min(SAMPLES_PER_BLOCK, last_index - first), len(names)), np.nan)
-            values[indices[here] - first] = si[here]
+            values[indices[in_block] - first] = si[in_block]
             columns.put(names, first, values)
 
     for block in group.source.blocks(group.names):

@@ -80,27 +80,25 @@ def consequences(
     that are compared.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    known = dict[int, SectionOutcome]()
+    outcome_of_start = dict[int, SectionOutcome]()
 
     def consequence(number: int, finding: Finding) -> Consequence:
         signals = [s for s in recording.signals if s.name in finding.signals]
-        right = CORRECTION_OF_CHECK.get(finding.check)
-        if right is None or not signals:
+        correction = CORRECTION_OF_CHECK.get(finding.check)
+        if correction is None or not signals:
             return Consequence(finding)
         first, count = _judged_window(finding, recording)
         samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
-        corrected, begun, place = (
-            right(finding, signals, samples, recording.period),
-            folder / f"from {first}",
-            str(number),
-        )
+        corrected = samples | correction(finding, signals, samples, recording.period)
+        start_folder, corrected_folder = folder / f"from {first}", folder / str(number)
         try:
-            if first not in known:
-                known[first] = run(samples_as_recording(recording, samples, begun), begun)
-            put_right = run(samples_as_recording(recording, samples | corrected, folder / place), folder / place)
+            if first not in outcome_of_start:
+                outcome_of_start[first] = run(samples_as_recording(recording, samples, start_folder), start_folder)
+            corrected_recording = samples_as_recording(recording, corrected, corrected_folder)
+            corrected_outcome = run(corrected_recording, corrected_folder)
         except (InputError, RunFailed):
             return Consequence(finding)
-        return _most_changed_force(finding, known[first], put_right, answers)
+        return _most_changed_force(finding, outcome_of_start[first], corrected_outcome, answers)
 
     return tuple(consequence(number, finding) for number, finding in enumerate(_distinct_doubts(findings)))
 
@@ -122,11 +120,11 @@ def consequence_texts(consequences: Iterable[Consequence]) -> list[str]:
     """A text for each consequence. Of more than LISTED_FINDINGS by the same check only the worst is described, with
     their number.
     """
-    kinds: dict[str, list[Consequence]] = {}
+    by_check: dict[str, list[Consequence]] = {}
     for consequence in consequences:
-        kinds.setdefault(consequence.finding.check, []).append(consequence)
+        by_check.setdefault(consequence.finding.check, []).append(consequence)
     out = list[str]()
-    for alike in kinds.values():
+    for alike in by_check.values():
         worst = max(alike, key=lambda each: (each.grade, np.nan_to_num(abs(each.force))))
         out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > LISTED_FINDINGS else map(str, alike)
     return out

@@ -21,33 +21,33 @@ REPEATED_SHARE, LONGEST_REPEAT = 0.2, 30.0
 
 
 def errors_of_steps(
-    job: SectionRun, outcome: SectionOutcome, before: dict[str, Estimate], folder: Path
+    job: SectionRun, outcome: SectionOutcome, earlier_errors: dict[str, Estimate], folder: Path
 ) -> dict[str, Estimate]:
     """Errors that the steps cause, by the name of the channel: of the forces of springs, mounts and bars, and of roll
     and pitch.
 
-    before : errors of the virtual measurement by the element's name, which come on top. Raises RunFailed where the
-    stretch, which begins at rest in the middle of the recording, does not end.
+    earlier_errors : errors of the virtual measurement by the element's name, which come on top. Raises RunFailed where
+    the stretch, which begins at rest in the middle of the recording, does not end.
     """
     grid, recording = job.grid, job.recording
     count = round(min(REPEATED_SHARE * recording.duration, LONGEST_REPEAT) / recording.period) + 1
     first = (recording.count - count) // 2
     samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
     shutil.rmtree(folder, ignore_errors=True)
-    part = replace(job, recording=samples_as_recording(recording, samples, folder))
-    coarse = march(part, folder / "own")
-    fine = march(replace(part, step=0.5 * grid.step), folder / "half")
-    every, told = round(coarse.period / fine.period), dict[str, Estimate]()
-    for name, element in _principal_channels(job, outcome, bool(before)).items():
-        error = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), TOLD_ORDERS, grid.step)
+    middle_job = replace(job, recording=samples_as_recording(recording, samples, folder))
+    coarse = march(middle_job, folder / "own")
+    fine = march(replace(middle_job, step=0.5 * grid.step), folder / "half")
+    stride, errors = round(coarse.period / fine.period), dict[str, Estimate]()
+    for name, element in _principal_channels(job, outcome, bool(earlier_errors)).items():
+        error = estimate(fine.samples(name)[::stride][: coarse.done], coarse.samples(name), TOLD_ORDERS, grid.step)
         scaled = replace(
             error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
         )
-        told[name] = estimate_rescaled(scaled, size_of(outcome.samples(name)), grid.step)
-        if element in before:
-            told[name] = summed_error(told[name], before[element])
+        errors[name] = estimate_rescaled(scaled, size_of(outcome.samples(name)), grid.step)
+        if element in earlier_errors:
+            errors[name] = summed_error(errors[name], earlier_errors[element])
     shutil.rmtree(folder, ignore_errors=True)
-    return told
+    return errors
 
 
 def _principal_channels(job: SectionRun, outcome: SectionOutcome, virtual: bool) -> dict[str, str]:
@@ -65,4 +65,4 @@ def _principal_channels(job: SectionRun, outcome: SectionOutcome, virtual: bool)
 
 
 def _unit(job: SectionRun, element: str) -> str:
-    return next(each.unit for each in job.vehicle.elements if each.name == element)
+    return next(candidate.unit for candidate in job.vehicle.elements if candidate.name == element)

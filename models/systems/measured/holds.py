@@ -24,13 +24,13 @@ def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, AttitudeHo
     """For each run by name, the way in which roll and pitch are held: free, and by the stabiliser that the scene
     names.
     """
-    stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
-    held = {
-        stabilised.method: AttitudeHold(
-            stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
+    settings, deviations = scene.stabilise, noise_of(scene.noise, recording)
+    stabilised_hold = {
+        settings.method: AttitudeHold(
+            settings.method, settings.bandwidth, settings.model, settings.smoothing, **deviations
         )
     }
-    return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if stabilised.method == "none" else held)
+    return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if settings.method == "none" else stabilised_hold)
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:

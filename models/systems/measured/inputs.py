@@ -26,27 +26,28 @@ from models.vehicles.cut_vehicle import CutVehicle
 
 ANGLE_SIGNALS = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
 SPLINE_WINDOW, SPLINE_OVERLAP = 4096, 96
-"""Answers in a stretch whose spline is made at once, and samples beside it: what is farther has weights below 1e-30."""
+"""Output samples in a window whose spline is made at once, and samples beside it, whose weights are below 1e-30 farther
+off."""
 
 
 @dataclass(frozen=True)
 class StepGrid:
     """Steps of a run on a recording's clock.
 
-    A half step is ``part`` of a sampling period; an answer is given every ``every`` steps, ``samples_per_output``
-    samples apart.
+    A half step is ``half_step_ratio`` of a sampling period; output samples are ``steps_per_output`` steps and
+    ``samples_per_output`` samples of the recording apart.
     """
 
     step: float
     period: float
 
     @property
-    def part(self) -> Fraction:
+    def half_step_ratio(self) -> Fraction:
         """Ratio of half a step to the sampling period."""
         return Fraction(self.step / (2 * self.period)).limit_denominator(1000)
 
     @property
-    def every(self) -> int:
+    def steps_per_output(self) -> int:
         """Number of steps from one output sample to the next."""
         return max(round(self.period / self.step), 1)
 
@@ -80,7 +81,7 @@ class StepGrid:
 
     def _samples_before(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Index of the last sample before each half step, and the fraction of the sampling period since then."""
-        numerator, denominator = self.part.numerator, self.part.denominator
+        numerator, denominator = self.half_step_ratio.numerator, self.half_step_ratio.denominator
         place = np.arange(count) * numerator
         return place // denominator, (place % denominator) / denominator
 
@@ -178,24 +179,24 @@ class Prescribed:
 
     def __init__(self, inputs: Inputs, grid: StepGrid, bandwidth: float, file: str = "") -> None:
         """``bandwidth`` (Hz) : of a low-pass over the whole recording. InputError where an angle is missing."""
-        whole = inputs.tilt(0, inputs.recording.count)[:, :2]
-        if not np.isfinite(whole).all():
+        angles = inputs.tilt(0, inputs.recording.count)[:, :2]
+        if not np.isfinite(angles).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
-        self.angles, self.grid = low_passed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
-        self._length = SPLINE_WINDOW * grid.samples_per_output
-        self._per = int(self._length / grid.part)
+        self.angles, self.grid = low_passed(angles, grid.period, bandwidth, file, "stabilise.smoothing"), grid
+        self._window_length = SPLINE_WINDOW * grid.samples_per_output
+        self._rows_per_window = int(self._window_length / grid.half_step_ratio)
 
     def rows(self, first: int, count: int) -> np.ndarray:
         """Roll, pitch, their rates and accelerations (count, 6) at half steps after sample ``first``."""
-        begin, out, done, period = int(first / self.grid.part), np.empty((count, 6)), 0, self.grid.period
+        first_row, out, done, period = int(first / self.grid.half_step_ratio), np.empty((count, 6)), 0, self.grid.period
         while done < count:
-            window, offset = divmod(begin + done, self._per)
-            taken = min(self._per - offset, count - done)
-            stretch = window * self._length
-            start = max(stretch - SPLINE_OVERLAP, 0)
-            samples = self.angles[start : stretch + self._length + SPLINE_OVERLAP + 1]
+            window, offset = divmod(first_row + done, self._rows_per_window)
+            row_count = min(self._rows_per_window - offset, count - done)
+            window_start = window * self._window_length
+            start = max(window_start - SPLINE_OVERLAP, 0)
+            samples = self.angles[start : window_start + self._window_length + SPLINE_OVERLAP + 1]
             spline = Smooth(samples, period, derivatives=2, degree=5)
-            rows = spline.sample((stretch - start) * period, self.grid.step / 2, self._per)
-            out[done : done + taken] = rows[offset : offset + taken]
-            done += taken
+            rows = spline.sample((window_start - start) * period, self.grid.step / 2, self._rows_per_window)
+            out[done : done + row_count] = rows[offset : offset + row_count]
+            done += row_count
         return out

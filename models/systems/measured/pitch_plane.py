@@ -166,8 +166,8 @@ def _axle(job: PlaneJob, axle: str, findings: list[Finding]) -> np.ndarray:
     """Vertical force (n,) of an axle with short gaps bridged; InputError for a long gap or a missing wheel."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        whole, left, right = map(repr, FORCE_PLACES[axle])
-        text = f"the vertical force is needed at {whole}, or at both {left} and {right}"
+        axle_place, left, right = map(repr, FORCE_PLACES[axle])
+        text = f"the vertical force is needed at {axle_place}, or at both {left} and {right}"
         raise InputError(job.file, "files.channels", None, text)
     return np.asarray(sum(_samples_without_gaps(job, signal, findings) for signal in signals))
 
@@ -204,8 +204,8 @@ def _section_outcome(result: Result, findings: tuple[Finding, ...], folder: Path
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
     channels = dict[SectionChannel, np.ndarray]()
     for name, spring in SPRING_NAMES.items():
-        for axis, way in (("x", "forward"), ("z", "upward")):
-            text = f"on the {CHASSIS_NAME} in its axes, {way} positive"
+        for axis, direction in (("x", "forward"), ("z", "upward")):
+            text = f"on the {CHASSIS_NAME} in its axes, {direction} positive"
             channels[SectionChannel(f"{spring} F{axis}", "N", text, spring, "force", spring, axis)] = forces[
                 f"{name}{axis}"
             ]

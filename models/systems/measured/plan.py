@@ -39,23 +39,23 @@ def opened_files(scene: MeasuredScene) -> tuple[Source, ...]:
 
 def signals_of_files(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
     """Signals of all files. InputError also where a wheel has no vertical force, or the stabiliser no angles."""
-    every, method = mapped_signals(scene, sources, rig.places), scene.stabilise.method
-    driving = {(s.quantity, s.at, s.component) for s in every if not s.check}
+    signals, method = mapped_signals(scene, sources, rig.places), scene.stabilise.method
+    driving = {(s.quantity, s.at, s.component) for s in signals if not s.check}
     for hub in rig.hubs if rig.vehicle else ():
         if ("force", hub, "z") not in driving:
             raise InputError(scene.file, "files", None, MISSING_FORCE_TEXT.format(repr(hub)))
-    wanted = {"none": (), "prescribed": ("angle",), "kalman": ("angle", "angular rate")}[method]
-    for quantity in wanted:
+    needed_quantities = {"none": (), "prescribed": ("angle",), "kalman": ("angle", "angular rate")}[method]
+    for quantity in needed_quantities:
         for axis in rig.angles:
             if (quantity, rig.chassis, axis) not in driving:
                 needed = f"needs the {quantity} {axis!r} of {rig.chassis!r}, which no channel is mapped to"
                 raise InputError(scene.file, "stabilise.method", method, f"{needed}: map it, or say 'none'")
-    return every
+    return signals
 
 
 def _check_names(scene: MeasuredScene, rig: Rig) -> None:
     bodies = rig.places.bodies
-    named = [
+    named_in_scene = [
         *(
             (f"sensors.{name}.body", sensor.body, "the vehicle has no such body", bodies)
             for name, sensor in scene.sensors.items()
@@ -66,9 +66,9 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
             for name in scene.hand_on.sections or ()
         ),
     ]
-    for place, name, wrong, known in named:
+    for key, name, reason, known in named_in_scene:
         if name not in known:
-            raise InputError(scene.file, place, name, wrong, known)
+            raise InputError(scene.file, key, name, reason, known)
 
 
 def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
@@ -86,22 +86,25 @@ def describe(scene: MeasuredScene) -> str:
     _check_names(scene, rig)
     size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
-    virtual, stabilised, wanted = scene.virtual, scene.stabilise, scene.hand_on
+    virtual, stabilised, handed_on = scene.virtual, scene.stabilise, scene.hand_on
     if virtual is None:
         lines += _file_lines(scene, rig)
     else:
         road = f"{virtual.duration:g} s on ISO 8608 class {virtual.road.iso8608} at {virtual.road.speed:g} m/s"
-        told = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
-        lines.append(_line("measured", told))
-    how = {
+        text = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
+        lines.append(_line("measured", text))
+    text_of_method = {
         "kalman": f"Kalman filter of roll and pitch, a moment towards it of {stabilised.bandwidth:g} Hz",
         "prescribed": f"measured roll and pitch enforced, smoothed at {stabilised.smoothing:g} Hz",
         "none": "nothing",
     }
-    sections, slopes = ", ".join(wanted.sections or ["every section"]), ", ".join(f"{each:g}" for each in wanted.slopes)
+    sections, slopes = (
+        ", ".join(handed_on.sections or ["every section"]),
+        ", ".join(f"{each:g}" for each in handed_on.slopes),
+    )
     lines += [
-        _line("runs", f"free, and held by: {how[stabilised.method]}; {scene.run.engine}"),
-        _line("hand on", f"{sections}; as {', '.join(wanted.formats)}; damage of slopes {slopes}"),
+        _line("runs", f"free, and held by: {text_of_method[stabilised.method]}; {scene.run.engine}"),
+        _line("hand on", f"{sections}; as {', '.join(handed_on.formats)}; damage of slopes {slopes}"),
     ]
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
@@ -109,11 +112,11 @@ def describe(scene: MeasuredScene) -> str:
 def _file_lines(scene: MeasuredScene, rig: Rig) -> list[str]:
     """Lines on every file and its channels, as these will be read."""
     sources, lines = opened_files(scene), list[str]()
-    every = signals_of_files(scene, sources, rig)
+    signals = signals_of_files(scene, sources, rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
         lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))
-        for s in (s for s in every if s.file == source.path.name):
+        for s in (s for s in signals if s.file == source.path.name):
             what = f"{s.quantity} {s.component}".strip()
             sign, use = "-" if s.sign < 0 else "", ", only compared with" if s.check else ""
             lines.append(

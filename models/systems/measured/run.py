@@ -196,8 +196,10 @@ def _judged_by_assumptions(run: Result, examination: Examination) -> Result:
         return run
     with_assumptions(run, assumptions(examination.scene, examination.rig.vehicle, examination))
     if examination.plane is not None:
-        run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, examination.plane))
-        run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *run_said[key]] for key in run_said})
+        stated_here, stated_by_run = (json.loads(each.data.attrs["assumptions"]) for each in (run, examination.plane))
+        run.data.attrs["assumptions"] = json.dumps(
+            {key: [*stated_by_run[key], *stated_here[key]] for key in stated_here}
+        )
         run.data.attrs["error"] = examination.plane.data.attrs["error"]
     return run
 
@@ -209,19 +211,19 @@ def _with_error(run: Result, examination: Examination, work: Path) -> Result:
         return run
     if examination.chosen_run in examination.failed:
         return not_estimated(run, f"the run did not end: {examination.failed[examination.chosen_run]}")
-    before = examination.virtual.errors if examination.virtual is not None else {}
+    earlier_errors = examination.virtual.errors if examination.virtual is not None else {}
     try:
-        told = errors_of_steps(job, outcome, before, work)
+        errors = errors_of_steps(job, outcome, earlier_errors, work)
     except (InputError, RunFailed) as failure:
         return not_estimated(run, f"a part of it, in half the step, did not end: {failure}")
-    return with_stated_errors(run, told, "a part from the middle, in its steps and in half of them")
+    return with_stated_errors(run, errors, "a part from the middle, in its steps and in half of them")
 
 
 def _begun_examination(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
     """Start an examination: bring the recording onto one clock, from the scene's files or from those of a virtual
     measurement.
     """
-    rig, virtual, seconds, begun = scene.rig(), None, dict[str, float](), time.perf_counter()
+    rig, virtual, seconds, start_time = scene.rig(), None, dict[str, float](), time.perf_counter()
     (folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
         progress("virtual measurement", 0.0)
@@ -229,10 +231,10 @@ def _begun_examination(scene: MeasuredScene, engine: str, folder: Path, progress
         if not (folder / "scene.toml").is_file():  # else a killed run has written it
             write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
         scene = load(folder / "scene.toml")
-        seconds["virtual measurement"] = time.perf_counter() - begun
+        seconds["virtual measurement"] = time.perf_counter() - start_time
     recording = read_files(scene, folder / WORK_FOLDER, lambda text, part: progress(text, 0.2 * part))
     exam = Examination(scene, rig, engine, recording, virtual, holds_of(scene, recording), seconds=seconds)
-    _record_seconds(exam, "reading", begun)
+    _record_seconds(exam, "reading", start_time)
     return exam
 
 
@@ -242,16 +244,16 @@ def read_files(scene: MeasuredScene, folder: Path, progress: Progress = no_progr
     return record_on_clock(scene, sources, signals_of_files(scene, sources, rig), rig.hubs, folder, progress)
 
 
-def _record_seconds(examination: Examination, stage: str, begun: float) -> None:
-    """Record the seconds of a stage that has ended: time since ``begun`` less that of the earlier stages."""
-    examination.seconds[stage] = time.perf_counter() - begun - sum(examination.seconds.values())
+def _record_seconds(examination: Examination, stage: str, start_time: float) -> None:
+    """Record the seconds of a stage that has ended: time since ``start_time`` less that of the earlier stages."""
+    examination.seconds[stage] = time.perf_counter() - start_time - sum(examination.seconds.values())
 
 
 def _examine(examination: Examination, folder: Path, progress: Progress, error: bool) -> None:
     """Check the recording, predict its drift, run it, judge the runs and hand on forces, as far as the recording can be
     used.
     """
-    lap = partial(_record_seconds, examination, begun=time.perf_counter() - sum(examination.seconds.values()))
+    lap = partial(_record_seconds, examination, start_time=time.perf_counter() - sum(examination.seconds.values()))
     progress("checks", 0.2)
     examination.findings = findings_of_all_checks(examination.evidence)
     lap("checks")
@@ -293,9 +295,9 @@ def _predict_drift(examination: Examination, vehicle: CutVehicle) -> None:
     level = Level(free.force, free.moment, bias, tilt, rate)
     examination.drift = predicted_drift(vehicle, level, recording.period, recording.duration, frame)
     lacking = examination.evidence.missing_data_text
-    rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
+    unchecked_text = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
     examination.trust = tuple(
-        (what, replace(examination.drift.trust(angle), unchecked_text=rest))
+        (what, replace(examination.drift.trust(angle), unchecked_text=unchecked_text))
         for what, angle in (("section forces", None), ("motion", UNTRUSTED_PITCH))
     )
 
@@ -316,11 +318,11 @@ def _run(examination: Examination, work: Path, progress: Progress, error: bool) 
             check_run(job)
     for i, name in enumerate(examination.holds):
         progress(f"{name} run", 0.2 + 0.7 * i / len(examination.holds))
-        told = _with_time_left(
+        progress_of_run = _with_time_left(
             f"{name} run", progress, 0.2 + 0.7 * i / len(examination.holds), 0.7 / len(examination.holds)
         )
         try:
-            examination.runs[name] = examination.march(name, work / name, told, error)
+            examination.runs[name] = examination.march(name, work / name, progress_of_run, error)
         except RunFailed as error:
             examination.failed[name] = str(error)
             if isinstance(error.partial, SectionOutcome):
@@ -335,13 +337,15 @@ def _with_time_left(name: str, progress: Progress, begin: float, share: float) -
     """Progress callback of a run that adds an estimate of the remaining time."""
     started, first = time.monotonic(), [-1.0]
 
-    def told(completed: float, total: float) -> None:
+    def report(completed: float, total: float) -> None:
         first[0] = completed if first[0] < 0 else first[0]
         spent = time.monotonic() - started
-        left = f", {spent * (total - completed) / (completed - first[0]):.0f} s left" if completed > first[0] else ""
-        progress(f"{name}: {completed:.0f} of {total:.0f} s{left}", begin + share * completed / max(total, 1e-9))
+        time_left = (
+            f", {spent * (total - completed) / (completed - first[0]):.0f} s left" if completed > first[0] else ""
+        )
+        progress(f"{name}: {completed:.0f} of {total:.0f} s{time_left}", begin + share * completed / max(total, 1e-9))
 
-    return told
+    return report
 
 
 def _with_verdicts(examination: Examination) -> None:
@@ -351,17 +355,17 @@ def _with_verdicts(examination: Examination) -> None:
     for name, outcome in examination.runs.items():
         job = examination.job(name)
         assert isinstance(job, SectionRun)
-        beside = tuple(compare(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
+        comparisons = tuple(compare(recording, outcome, *pair, slopes) for pair in channels_to_compare(job))
         examination.verdicts[name] = judge(
             job,
             outcome,
             examination.scene.limits,
             examination.drift.passing_time(examination.drift.angle) or recording.duration,
-            [compared for compared in beside if compared.signal.check],
+            [compared for compared in comparisons if compared.signal.check],
             {s.name: noise(recording, s) for s in recording.signals if s.check},
         )
         if name == examination.chosen_run:
-            examination.channel_comparisons = beside
+            examination.channel_comparisons = comparisons
 
 
 def _with_consequences(examination: Examination, work: Path) -> None:
@@ -388,9 +392,9 @@ def _save_section_forces(examination: Examination, outcome: SectionOutcome, fold
     """Count the cycles of the section forces, and write these in every format that the scene names. Existing files of
     an interrupted run are kept.
     """
-    answers, wanted = examination.forces(outcome), examination.scene.hand_on
-    examination.counted = {answer: counted_load(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
-    examination.handed_files = tuple(folder / f"{FILE_STEM}.{form}" for form in wanted.formats)
+    answers, settings = examination.forces(outcome), examination.scene.hand_on
+    examination.counted = {answer: counted_load(outcome.samples(answer), tuple(settings.slopes)) for answer in answers}
+    examination.handed_files = tuple(folder / f"{FILE_STEM}.{form}" for form in settings.formats)
     formats = [path.suffix[1:] for path in examination.handed_files if not path.exists()]
     comment = (
         f"{examination.scene.title}; computed from wheel forces, {examination.chosen_run} run, {examination.engine}"

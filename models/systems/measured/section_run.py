@@ -107,12 +107,12 @@ class SectionOutcome:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file of arrays and the inputs that these depend on: ``of`` has a checksum of each input by a name that users
-    understand.
+    """A file of arrays and the inputs that these depend on: ``input_checksums`` has a checksum of each
+    input by a name that users understand.
     """
 
     path: Path
-    of: dict[str, str] = field(default_factory=dict)
+    input_checksums: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> dict[str, np.ndarray] | None:
         """The saved arrays, None without a checkpoint. InputError if they depend on other inputs; it names the one that
@@ -123,19 +123,23 @@ class Checkpoint:
         try:
             with np.load(self.path) as file:
                 arrays = dict(file)
-            of = json.loads(str(arrays.pop("of")))
+            saved_checksums = json.loads(str(arrays.pop("of")))
         except Exception as error:
             raise InputError(self.path, "", None, f"is no checkpoint of a run: remove its folder ({error})") from error
-        differing = [name for name in sorted({*of, *self.of}) if of.get(name) != self.of.get(name)]
+        differing = [
+            name
+            for name in sorted({*saved_checksums, *self.input_checksums})
+            if saved_checksums.get(name) != self.input_checksums.get(name)
+        ]
         if differing:
-            what = f"is of a run with another {' and another '.join(differing)}"
-            raise InputError(self.path, "", None, f"{what}: choose another folder, or remove this one")
+            reason = f"is of a run with another {' and another '.join(differing)}"
+            raise InputError(self.path, "", None, f"{reason}: choose another folder, or remove this one")
         return arrays
 
     def save(self, **arrays: np.ndarray) -> None:
         """Save these arrays in place of the earlier ones."""
         buffer = BytesIO()
-        np.savez(buffer, of=np.array(json.dumps(self.of)), **arrays)  # type: ignore[arg-type]
+        np.savez(buffer, of=np.array(json.dumps(self.input_checksums)), **arrays)  # type: ignore[arg-type]
         write_whole(self.path, buffer.getvalue())
 
 
@@ -157,7 +161,7 @@ def check(job: SectionRun) -> None:
     grid.check(job.file)
     if job.count < 2:
         raise InputError(job.file, "files", None, f"the recording has {job.recording.count} samples: nothing to run")
-    check_step(job.engine, job.vehicle, grid.step, grid.step * grid.every)
+    check_step(job.engine, job.vehicle, grid.step, grid.step * grid.steps_per_output)
     if hold.method == "kalman" and hold.bandwidth * grid.step > STIFFEST_PULL:
         limit = f"must be at most {STIFFEST_PULL:g} of the rate of the run's steps, {STIFFEST_PULL / grid.step:g} Hz"
         raise InputError(job.file, "stabilise.bandwidth", hold.bandwidth, limit)
@@ -177,7 +181,7 @@ def run(
     run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle topples.
     """
     check(job)
-    march = _March(job, folder, max(round(block / (job.grid.step * job.grid.every)), 1))
+    march = _March(job, folder, max(round(block / (job.grid.step * job.grid.steps_per_output)), 1))
     period = job.recording.period * job.grid.samples_per_output
     progress(march.done * period, job.recording.duration)
     while march.done < job.count:
@@ -209,7 +213,7 @@ class _March:
 
     def outcome(self) -> SectionOutcome:
         """The outcome of the march up to now."""
-        steps = (self.done - 1) * self.grid.every
+        steps = (self.done - 1) * self.grid.steps_per_output
         return SectionOutcome(
             self.columns,
             self.job.sections.answers,
@@ -224,14 +228,16 @@ class _March:
     def advance(self) -> None:
         """March a block and save it; RunFailed carries the outcome so far."""
         grid, last = self.grid, self.job.count - 1
-        answers = min(self.length, max(last - self.done, 1))
-        hub_inputs = self._hub_inputs(self.done * grid.samples_per_output, answers * grid.every)
-        model = build(self.job.engine, self.job.vehicle, hub_inputs, grid.step, answers * grid.every * grid.step)
+        sample_count = min(self.length, max(last - self.done, 1))
+        hub_inputs = self._hub_inputs(self.done * grid.samples_per_output, sample_count * grid.steps_per_output)
+        model = build(
+            self.job.engine, self.job.vehicle, hub_inputs, grid.step, sample_count * grid.steps_per_output * grid.step
+        )
         states, failure = self._marched(model)
-        ends = self.done + answers >= last
-        kept = states[:: grid.every] if failure or ends else states[: -1 : grid.every]
-        self.columns.write(self.done, self.job.sections.read(model.numbers, kept, 2 * grid.every))
-        self.done, self.state = self.done + len(kept), states[-1].copy()
+        is_last = self.done + sample_count >= last
+        output_states = states[:: grid.steps_per_output] if failure or is_last else states[: -1 : grid.steps_per_output]
+        self.columns.write(self.done, self.job.sections.read(model.numbers, output_states, 2 * grid.steps_per_output))
+        self.done, self.state = self.done + len(output_states), states[-1].copy()
         if failure is not None:
             failure.partial = self.outcome()
             raise failure
@@ -246,18 +252,18 @@ class _March:
             states = model.marched(*np.split(self.state, 2)).states
         except RunFailed:
             states = self._march_until_failure(model)
-        inside = states[:, 4:]  # where it is and where it heads may be anything
+        bounded_states = states[:, 4:]  # where it is and where it heads may be anything
         toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > UPRIGHT
-        bad = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(inside) > SIZE_BOUND).any(axis=1)
-        if not bad.any() and len(states) == steps + 1:
+        is_invalid = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(bounded_states) > SIZE_BOUND).any(axis=1)
+        if not is_invalid.any() and len(states) == steps + 1:
             return states, None
-        good = int(np.argmax(bad)) if bad.any() else len(states)
+        first_invalid = int(np.argmax(is_invalid)) if is_invalid.any() else len(states)
         reason = (
             f"the vehicle topples: roll or pitch beyond {UPRIGHT} rad"
-            if good < len(states) and toppled[good]
+            if first_invalid < len(states) and toppled[first_invalid]
             else "the state became infinite or not a number"
         )
-        states = states[: max(good, 1)]
+        states = states[: max(first_invalid, 1)]
         return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
     def _march_until_failure(self, model: HubModel) -> np.ndarray:
@@ -279,7 +285,7 @@ class _March:
         and pitch.
         """
         grid, rows = self.grid, 2 * steps + 1
-        used = math.floor((rows - 1) * grid.part) + 1
+        used = math.floor((rows - 1) * grid.half_step_ratio) + 1
         wrenches = self.inputs.wrenches_with_neighbours(first, used + 1)
         free = HubInputs(grid.cubic_rows(wrenches, rows), self.inputs.frame)
         if self.prescribed is not None:
@@ -301,11 +307,11 @@ class _March:
         """Initial state: at rest in the design position; where roll and pitch are held, these and their rates as
         measured."""
         n = self.job.vehicle.size
-        state, held = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
+        state, held_columns = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
         if self.prescribed is not None:
-            state[held] = self.prescribed.rows(0, 1)[0, :4]
+            state[held_columns] = self.prescribed.rows(0, 1)[0, :4]
         elif self.filter is not None:
-            state[held] = np.nan_to_num(self.inputs.tilt(0, 1)[0])
+            state[held_columns] = np.nan_to_num(self.inputs.tilt(0, 1)[0])
         return state
 
     def _filter(self) -> "TiltFilter":

@@ -85,14 +85,14 @@ class Sections:
             known = section_names(self.vehicle)
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
-        sliding, kept = _zero_components(self.vehicle, self.frame), list[tuple[int, SectionChannel]]()
+        sliding, channel_of_column = _zero_components(self.vehicle, self.frame), list[tuple[int, SectionChannel]]()
         for column, answer in enumerate(_kernel_columns(self.vehicle, self.frame, self.points)):
-            asked = self.wanted is None or answer.section in ("", *self.wanted)
-            if asked and answer.name not in sliding:
-                kept.append((column, answer))
+            is_wanted = self.wanted is None or answer.section in ("", *self.wanted)
+            if is_wanted and answer.name not in sliding:
+                channel_of_column.append((column, answer))
         joined = joints(self.vehicle)
-        object.__setattr__(self, "answers", tuple(answer for _, answer in kept))
-        object.__setattr__(self, "columns", np.array([column for column, _ in kept]))
+        object.__setattr__(self, "answers", tuple(answer for _, answer in channel_of_column))
+        object.__setattr__(self, "columns", np.array([column for column, _ in channel_of_column]))
         rows = [
             [joined.last[p.body], *np.subtract(p.position, joined.origin[p.body]), float(p.gravity)]
             for p in self.points

@@ -72,14 +72,14 @@ class VirtualMeasurement:
     """Signals that faultless transducers would record.
 
     signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
-    every : steps of a sampling period. errors : of the steps of the true run, where they were requested.
+    stride : steps of a sampling period. errors : of the steps of the true run, where they were requested.
     """
 
     vehicle: CutVehicle
     run: HubRun
     signals: tuple[Signal, ...]
     values: np.ndarray
-    every: int
+    stride: int
     errors: dict[str, Estimate] = field(default_factory=dict)
 
     @property
@@ -90,13 +90,13 @@ class VirtualMeasurement:
     @property
     def period(self) -> float:
         """Sampling period (s)."""
-        return self.step * self.every
+        return self.step * self.stride
 
     def samples(self, faults: Faults, seed: int, path: int = 0) -> np.ndarray:
         """Samples (m, signals), SI, with the faults of the transducers applied; NaN where a transducer gave no
         value.
         """
-        return measured_samples(faults, self.signals, self.values, self.step, self.every, seed, path)
+        return measured_samples(faults, self.signals, self.values, self.step, self.stride, seed, path)
 
 
 def virtual_measurement(
@@ -127,17 +127,17 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
     """Signals of all channels; InputError for steps that do not divide one another, and for names that the vehicle
     lacks.
     """
-    period, whole = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
+    period, divides_text = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
     if not divides(virtual.step, virtual.duration):
-        fit = f"must {whole}, as {fitting(virtual.step, virtual.duration)} s does"
-        raise InputError(file, "virtual.step", virtual.step, fit)
+        allowed = f"must {divides_text}, as {fitting(virtual.step, virtual.duration)} s does"
+        raise InputError(file, "virtual.step", virtual.step, allowed)
     if not (divides(virtual.step, period) and divides(period, virtual.duration)):
-        fit = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {whole}"
-        raise InputError(file, "virtual.sampling_rate", virtual.sampling_rate, fit)
+        allowed = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {divides_text}"
+        raise InputError(file, "virtual.sampling_rate", virtual.sampling_rate, allowed)
     known = tuple(element.name for element in vehicle.elements)
-    for place in ("travels", "sections"):
-        for name in (name for name in getattr(virtual, place) if name not in known):
-            raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
+    for key in ("travels", "sections"):
+        for name in (name for name in getattr(virtual, key) if name not in known):
+            raise InputError(file, f"virtual.{key}", name, "the vehicle has no such spring, mount or bar", known)
     signals = _signals_of_channels(vehicle, virtual)
     check_faults(virtual.faults, signals, file)
     return signals
@@ -147,23 +147,23 @@ def _signals_of_channels(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Si
     """Signals of hubs, motion and check channels, in the order of their columns."""
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
-        (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame)
+        (f"{hub}_{name.lower()}", quantity, hub, axis, virtual.frame)
         for hub in vehicle.hubs
-        for name, what, axis, _ in HUB_COMPONENTS
+        for name, quantity, axis, _ in HUB_COMPONENTS
     ]
     rows += [(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
     rows += [(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
     rows += [
         (f"{name}_a{axis}", "acceleration", name, axis, "body") for name in virtual.accelerometers for axis in "xyz"
     ]
-    checks = len(rows)
+    first_check = len(rows)
     rows += [
         (f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body") for name in virtual.sections
     ]
     rows += [(f"{name}_travel", "travel", name, "", "body") for name in virtual.travels]
     return tuple(
-        Signal(name, "", name, what, at, axis, frame, 1, *FILE_UNITS[what], check=i >= checks)
-        for i, (name, what, at, axis, frame) in enumerate(rows)
+        Signal(name, "", name, quantity, at, axis, frame, 1, *FILE_UNITS[quantity], check=i >= first_check)
+        for i, (name, quantity, at, axis, frame) in enumerate(rows)
     )
 
 

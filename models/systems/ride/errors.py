@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.core.discretisation import Estimate, with_stated_errors
+from models.core.discretisation import Estimate, root_mean_square, with_stated_errors
 from models.core.errors import InputError
 from models.core.result import Result
 from models.ride.covariance import stationary_covariance
@@ -63,7 +63,7 @@ def with_error_of_sweep(
     )
     deviation = swept.deviation[:, at]
     known = np.isfinite(deviation) & np.isfinite(recomputed)
-    sizes, told = [finite_rms(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
+    sizes, told = [root_mean_square(deviation[..., i][known[..., i]]) for i in range(len(swept.outputs))], {}
     largest = {
         unit: max(size for size, of in zip(sizes, swept.units, strict=True) if of == unit) for unit in swept.units
     }
@@ -71,7 +71,7 @@ def with_error_of_sweep(
         if size > 0.0:
             there = known[..., i]
             changes = recomputed[..., i][there] - deviation[..., i][there]
-            error = max(SAFETY_FACTOR * finite_rms(changes), MATRIX_ACCURACY / 4.0 * size)
+            error = max(SAFETY_FACTOR * root_mean_square(changes), MATRIX_ACCURACY / 4.0 * size)
             told[name] = Estimate(error, unit, error / max(size, STILL * largest[unit]), 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return with_stated_errors(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
@@ -88,8 +88,3 @@ def _deviations_of_changed(
         return stationary_covariance(system).deviation
     except InputError:
         return np.full(len(system.names), np.nan)
-
-
-def finite_rms(values: np.ndarray) -> float:
-    """Root mean square of values, 0 if there are none."""
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -12,6 +12,7 @@ from models.core.discretisation import (
     not_estimated,
     observed_order,
     of_chance,
+    root_mean_square,
     with_stated_errors,
 )
 from models.core.errors import RunFailed
@@ -21,7 +22,6 @@ from models.ride.speed_profile import SpeedProfile
 from models.ride.statistical_linearisation import StatisticallyLinear
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, VaryingSpeed, varying_speed
 from models.road.excitation import Excitation
-from models.systems.ride.errors import finite_rms
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -74,9 +74,8 @@ def with_error_of_drive(
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
-    return estimated(
-        run, fine, rerun, DRIVE_ORDER, step, sizes={name: finite_rms(each) for name, each in fine.channels.items()}
-    )
+    sizes = {name: root_mean_square(deviations) for name, deviations in fine.channels.items()}
+    return estimated(run, fine, rerun, DRIVE_ORDER, step, sizes=sizes)
 
 
 def _drive_until(profile: SpeedProfile, end: float) -> SpeedProfile:
@@ -155,6 +154,6 @@ def _of_gains(
     for i, name in enumerate(beside[0][1].names):
         known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])
         if known.any():
-            error, size = finite_rms(errors[known, i]), finite_rms(gains[known, i])
+            error, size = root_mean_square(errors[known, i]), root_mean_square(gains[known, i])
             told[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
     return told

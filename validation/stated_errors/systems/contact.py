@@ -10,10 +10,9 @@ import numpy as np
 
 from models.contact.accuracy import coarser_cells
 from models.contact.theories import RollingContact
-from models.core.discretisation import errors_of
+from models.core.discretisation import errors_of, finite_rms
 from models.systems.contact.run import CELL_POWER, run
 from models.systems.contact.scene import ContactScene, build
-from models.systems.contact.stated_error import finite_rms
 from validation.stated_errors.sample import Sample, drawn_samples
 
 FINER_CELLS, MOST_CELLS, OF_EXACT = 10, 400, 60

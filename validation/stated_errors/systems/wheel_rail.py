@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.core.discretisation import errors_of
-from models.systems.contact.stated_error import finite_rms
+from models.core.discretisation import errors_of, finite_rms
 from models.systems.wheel_rail.run import POSITIONS_PER_ERROR, WHEEL_QUANTITIES, run, wheel_sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
 from validation.stated_errors.sample import Sample, drawn_samples
