@@ -212,3 +212,18 @@ def test_a_function_is_compiled_once_for_all_numbers_that_its_callers_write_out(
         return shifted(x, 1) + shifted(x, 2)
 
     assert summed(1.0) == 5.0 and len(shifted.signatures) == 1
+
+
+CALLBACK_OF_A_KERNEL = """
+from models.engines.mujoco_callback import kernel_law
+from models.rail.joint_forces import joint_forces
+print(kernel_law(joint_forces).cache_hits)
+"""
+
+
+def test_a_callback_that_passes_data_to_a_kernel_is_compiled_once_for_all_processes():
+    hits = [
+        subprocess.run([sys.executable, "-c", CALLBACK_OF_A_KERNEL], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert hits[1].strip() == "1"

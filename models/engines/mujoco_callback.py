@@ -10,6 +10,7 @@ address that could go stale in numba's cache.
 """
 
 from functools import cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numba import cfunc, types
 from numba.extending import register_jitable
 
 from models.engines.mujoco_layout import offsets
+from models.machine.compiled import callback, named_closure
 from models.machine.stack import array_at, double_at
 
 HEADER, PER_ROAD = 7, 4
@@ -26,17 +28,21 @@ CALLBACK = types.void(types.voidptr, types.voidptr)
 FIELDS = ("numeric_data", "qfrc_passive", "time", "qpos", "qvel")
 
 
+forces: Any = None
+"""Stands here for the kernel that ``kernel_law`` puts in its place: were it a cell of the closure, no other process
+would know the machine code again."""
+
+
 @cache
 def kernel_law(kernel: Any) -> Any:
     """Callback that passes MuJoCo's data to a compiled kernel of (numbers, time, positions, rates, forces).
 
-    All but the time (s) are pointers to doubles, the numbers those of the model.
+    All but the time (s) are pointers to doubles, the numbers those of the model. It is kept on disk if the kernel is.
     """
     numbers, passive, time, position, rate = offsets(*FIELDS)
 
-    @cfunc(CALLBACK)
     def law(model, data):
-        kernel(
+        forces(
             array_at(model, numbers),
             double_at(data, time)[0],
             array_at(data, position),
@@ -44,7 +50,10 @@ def kernel_law(kernel: Any) -> Any:
             array_at(data, passive),
         )
 
-    return law
+    of_kernel = FunctionType(law.__code__, globals() | {"forces": kernel}, "law", None, law.__closure__)
+    if kernel.stats.cache_path is None:
+        return cfunc(CALLBACK)(of_kernel)
+    return callback(named_closure(of_kernel, kernel.__module__.replace(".", "_"), kernel.__name__), CALLBACK)
 
 
 @register_jitable

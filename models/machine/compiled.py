@@ -17,6 +17,8 @@ from typing import Any
 from uuid import uuid4
 
 import numba
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 from numba.core.types import unliteral
 
 ROOT = Path(__file__).parents[2]
@@ -56,16 +58,30 @@ def inlined(function: Callable) -> Any:
 
 
 def _kept_apart(compiled: Any) -> Any:
-    """The compiled function with changed cache files: names that do not depend on a shared counter, and stamps of the
-    sources."""
+    """The compiled function, once for all numbers that callers write out, with cache files that are safe."""
     _without_literals(compiled)
-    file = getattr(compiled._cache, "_cache_file", None)  # there is none where nothing is kept
+    _make_safe(compiled._cache, compiled.py_func)
+    return compiled
+
+
+def _make_safe(function_cache: Any, function: Callable) -> None:
+    """Change the cache of a function: names of files that do not depend on a shared counter, and stamps of the
+    sources."""
+    file = getattr(function_cache, "_cache_file", None)  # there is none where nothing is kept
     if file is not None:
         stem = file._index_name.removesuffix(".nbi")
         file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
-        file._source_stamp = stamp(*_files(compiled.py_func))
+        file._source_stamp = stamp(*_files(function))
         file._load_index = _or_none(file._load_index)
-    return compiled
+
+
+def callback(function: Callable, signature: Any) -> Any:
+    """C callback with this signature, kept on disk as kernels are; a kernel that it calls is one of its globals."""
+    law = CFunc(function, normalize_signature(signature), {}, {})
+    law.enable_caching()
+    _make_safe(law._cache, function)
+    law.compile()
+    return law
 
 
 def _without_literals(compiled: Any) -> None:

@@ -29,7 +29,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
 from models.core.trajectory import Trajectory
-from models.machine.compiled import inlined, lean, njit
+from models.machine.compiled import lean, njit
 from models.machine.records import size_of
 from models.rail.profile_contact import Pose
 from models.rail.wheel_forces import (
