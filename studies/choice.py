@@ -171,7 +171,7 @@ def choice_of_scene(
 ) -> SceneChoice:
     """The choice for a scene in one engine."""
     engine = engine_of(scene, engines)
-    with Crew.of(scene, usual=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *places_of(scene)) as pool:
         chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
         choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []

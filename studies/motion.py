@@ -182,7 +182,7 @@ def _recover_motions(source: Source, array: SensorArray, options: Options, p: Pa
     first method only."""
     source.quality = fit_quality(array, source.readings, p.deviation)
     suspect, readings = source.quality.suspect, source.readings
-    moved = partial(recovered_motion, period=source.period, start=source.start, zeroed=options.zeroed)
+    moved = partial(recovered_motion, sample_period=source.period, start=source.start, zeroed=options.zeroed)
     if suspect:
         source.recovered_motions["all sensors, integrated"] = moved(array, readings)
         readings = readings[:, [name != suspect for name in array.names]]

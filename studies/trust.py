@@ -87,7 +87,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
-    spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, usual=1))
+    spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")

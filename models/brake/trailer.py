@@ -51,8 +51,10 @@ def plane_of_train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> P
     truck_records, reach = plane_of_truck(vehicle, transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
-    both = (np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True))
-    parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
+    wheel_fields = (
+        np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True)
+    )
+    parts: list[Any] = [*units, reach, *wheel_fields, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
 
 
@@ -64,11 +66,11 @@ def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, .
     """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
     unit ``first``."""
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
-    place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
-    place[:2, 0] = 0.0
+    wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
+    wheel_positions[:2, 0] = 0.0
     static[:2] += trailer.drawbar_mass * GRAVITY / 2.0
     unit = np.array([first, first, first + 1, first + 1])
-    return unit, np.full(4, first + 1), place, radius, spin, static, by_x, by_y
+    return unit, np.full(4, first + 1), wheel_positions, radius, spin, static, by_x, by_y
 
 
 class Pull(NamedTuple):
@@ -103,7 +105,7 @@ def follow_hook(
 def _march_trailer(motion, hook, step, torques, vehicle, pull):
     plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
     size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
-    mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
+    mass, (right, row_along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
     states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
     under_wheels(state, step, vehicle, surfaces)
     for n in range(hook.shape[0] - 1):
@@ -112,7 +114,7 @@ def _march_trailer(motion, hook, step, torques, vehicle, pull):
             return False
         states[n + 1] = state
         fill_headings(0.5 * (states[n, 0] + state[0]), units)
-        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, along, across)
+        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, row_along, across)
         forces[n] = (mass @ accelerations - right)[:2]
         for i in range(plane.unit.size):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])

@@ -257,8 +257,8 @@ def _burden_sentences(figures: RunFigures, limits: Limits) -> list[str]:
     """Sentences on the stabiliser's share of moment and force where it exceeds the limit."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
-        f"artificial {name} {share:.0%} of {whole}"
-        for name, (share, whole) in shares.items()
+        f"artificial {name} {share:.0%} of {full_value}"
+        for name, (share, full_value) in shares.items()
         if not share <= limits.artificial_share
     ]
 

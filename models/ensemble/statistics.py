@@ -25,14 +25,18 @@ def deviation_with_error(values: np.ndarray) -> tuple[float, float]:
     return deviation_of(len(values), float(np.mean(centred**2)), float(np.mean(centred**4)))
 
 
-def deviation_of(count: int, second: float, fourth: float) -> tuple[float, float]:
-    """Standard deviation and its standard error, from the second and fourth central moments of ``count`` values."""
-    if count < FEWEST_PATHS:
-        raise InputError("", "values", count, f"a standard deviation and its error need {FEWEST_PATHS} values or more")
-    spread = math.sqrt(second * count / (count - 1))
+def deviation_of(value_count: int, second_moment: float, fourth: float) -> tuple[float, float]:
+    """Standard deviation and its standard error, from the second and fourth central moments of ``value_count``
+    values.
+    """
+    if value_count < FEWEST_PATHS:
+        raise InputError(
+            "", "values", value_count, f"a standard deviation and its error need {FEWEST_PATHS} values or more"
+        )
+    spread = math.sqrt(second_moment * value_count / (value_count - 1))
     if spread == 0.0:
         return 0.0, 0.0
-    return spread, math.sqrt(max(fourth - second**2, 0.0) / count) / (2 * math.sqrt(second))
+    return spread, math.sqrt(max(fourth - second_moment**2, 0.0) / value_count) / (2 * math.sqrt(second_moment))
 
 
 def percentiles(errors: np.ndarray) -> np.ndarray:
@@ -55,12 +59,13 @@ def quantile_with_interval(values: np.ndarray, level: float) -> tuple[float, flo
     return middle, low, high
 
 
-def quantile_ranks(count: int, level: float) -> tuple[int, int, int]:
-    """Ranks, from 0, of a quantile of ``count`` values and of the ends of its 95 % interval; InputError for a level
-    that is not between 0 and 1."""
+def quantile_ranks(value_count: int, level: float) -> tuple[int, int, int]:
+    """Ranks, from 0, of a quantile of ``value_count`` values and of the ends of its 95 % interval; InputError for a
+    level that is not between 0 and 1.
+    """
     if not 0.0 < level < 1.0:
         raise InputError("", "level", level, "must be between 0 and 1")
-    half = ERRORS_95 * math.sqrt(count * level * (1 - level))
-    places = (count * level, math.floor(count * level - half), count * level + half)
-    middle, low, high = (min(max(math.ceil(place) - 1, 0), count - 1) for place in places)
+    half = ERRORS_95 * math.sqrt(value_count * level * (1 - level))
+    rank_bounds = (value_count * level, math.floor(value_count * level - half), value_count * level + half)
+    middle, low, high = (min(max(math.ceil(rank) - 1, 0), value_count - 1) for rank in rank_bounds)
     return middle, low, high

@@ -52,15 +52,15 @@ class Store:
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())
             return
-        kept = _read_note(file)
-        for key in (*described, *kept):
-            if described.get(key) != kept.get(key):
+        stored_job = _read_note(file)
+        for key in (*described, *stored_job):
+            if described.get(key) != stored_job.get(key):
                 allowed = (
                     f"this folder belongs to another job: {described.get(key)!r} is asked for here; "
                     "resume with what it was "
                     "begun with, or begin in a new folder"
                 )
-                raise InputError(file, key, kept.get(key), allowed)
+                raise InputError(file, key, stored_job.get(key), allowed)
 
     def path(self, block: int) -> Path:
         """Path of a block's file."""
@@ -105,10 +105,10 @@ def exclusive_folder(folder: Path) -> Iterator[None]:
 
 def _read_note(file: Path) -> dict[str, Any]:
     try:
-        kept = json.loads(file.read_text())
+        note = json.loads(file.read_text())
     except (OSError, ValueError) as error:
         raise InputError(file, "", None, f"is not the note of an ensemble: {error}") from None
-    return kept if isinstance(kept, dict) else {}
+    return note if isinstance(note, dict) else {}
 
 
 def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
@@ -120,15 +120,17 @@ def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
     return dict(_flat_items("", {**facts, "code of models": _code_checksum(), "versions": versions}))
 
 
-def _flat_items(place: str, value: Any) -> list[tuple[str, Any]]:
+def _flat_items(key_path: str, value: Any) -> list[tuple[str, Any]]:
     if isinstance(value, dict):
         return [
-            pair for key, inner in value.items() for pair in _flat_items(f"{place}.{key}" if place else str(key), inner)
+            pair
+            for key, inner in value.items()
+            for pair in _flat_items(f"{key_path}.{key}" if key_path else str(key), inner)
         ]
     if isinstance(value, np.ndarray):
         digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return [(place, f"{value.dtype} {list(value.shape)} {digest}")]
-    return [(place, list(value) if isinstance(value, tuple) else value)]
+        return [(key_path, f"{value.dtype} {list(value.shape)} {digest}")]
+    return [(key_path, list(value) if isinstance(value, tuple) else value)]
 
 
 @cache
@@ -169,15 +171,15 @@ def _collect_files(value: Any, folder: Path, hashes: dict[str, str], paths_seen:
 
 def _file(text: str, folder: Path) -> Path | None:
     """The file that a text names, or None."""
-    before, _, _ = text.rpartition(":")
-    for path in (folder / text, Path(text), folder / before, Path(before)):
+    text_before_colon, _, _ = text.rpartition(":")
+    for path in (folder / text, Path(text), folder / text_before_colon, Path(text_before_colon)):
         if text and os.path.isfile(path):
             return path
-    return _of_module(before)
+    return _of_module(text_before_colon)
 
 
 def _of_module(name: str) -> Path | None:
-    if not name or not all(part.isidentifier() for part in name.split(".")):
+    if not name or not all(name_part.isidentifier() for name_part in name.split(".")):
         return None
     try:
         spec = find_spec(name)

@@ -17,10 +17,10 @@ def rainflow_cycles(turns):
         stack[top] = turns[i]
         top += 1
         while top - first >= 3:
-            last, before = abs(stack[top - 1] - stack[top - 2]), abs(stack[top - 2] - stack[top - 3])
-            if last < before:
+            last_range, previous_range = abs(stack[top - 1] - stack[top - 2]), abs(stack[top - 2] - stack[top - 3])
+            if last_range < previous_range:
                 break
-            closed[n] = before, 0.5 * (stack[top - 2] + stack[top - 3]), 1.0
+            closed[n] = previous_range, 0.5 * (stack[top - 2] + stack[top - 3]), 1.0
             if top - first == 3:
                 closed[n, 2] = 0.5
                 first += 1

@@ -36,8 +36,8 @@ def cone_on_rail(side, pose, cone):
     cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)
     sine = conicity * cosine
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    ahead = math.asin(side * conicity * sy * cr / math.hypot(cy, sy * sr)) - math.atan2(sy * sr, cy)
-    ca, sa = math.cos(ahead), math.sin(ahead)
+    contact_angle = math.asin(side * conicity * sy * cr / math.hypot(cy, sy * sr)) - math.atan2(sy * sr, cy)
+    ca, sa = math.cos(contact_angle), math.sin(contact_angle)
     n_y = sy * cosine * sa + cy * (side * sine * cr - cosine * ca * sr)
     n_z = side * sine * sr + cosine * ca * cr
     reach = half_gauge + radius / conicity  # from the wheelset's centre to the apex
@@ -47,8 +47,8 @@ def cone_on_rail(side, pose, cone):
     penetration = head - (n_y * axis_y + n_z * axis_z)
     # The generator per unit of the cone's radius, from the apex inwards: (sin ahead, -side / conicity, cos ahead).
     inward = -side / conicity
-    turned = inward * cr - ca * sr
-    way_x, way_y, way_z = cy * sa - sy * turned, sy * sa + cy * turned, inward * sr + ca * cr
+    across_inward = inward * cr - ca * sr
+    way_x, way_y, way_z = cy * sa - sy * across_inward, sy * sa + cy * across_inward, inward * sr + ca * cr
     rolling = (n_z * axis_y - n_y * axis_z) / (n_z * way_y - n_y * way_z)
     return (
         penetration,

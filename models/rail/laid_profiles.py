@@ -68,11 +68,11 @@ class Profiles(Strict):
             Wheelset(radius, self.back_to_back, self.taping),
         )
 
-    def touching(self, radius: float, shift: float) -> tuple[float, float]:
+    def touching(self, radius: float, lateral_shift: float) -> tuple[float, float]:
         """Rise of the wheelset (m) from its height at the track's middle, and roll (rad), at which both wheels just
         touch; InputError if they cannot."""
         side = self.side(radius)
-        pose = touching_pose(side, shift, 0.0)
+        pose = touching_pose(side, lateral_shift, 0.0)
         return pose.fall - side.clearance(Pose(0.0, 0.0, 0.0, 0.0)), pose.roll
 
 
@@ -116,9 +116,9 @@ def no_profile() -> LaidProfile:
 
 def _read_only_records(rows: Any, kind: np.dtype) -> Array:
     """Read-only records (n,) from rows of numbers."""
-    made = np.ascontiguousarray(rows, float).view(kind)[:, 0]
-    made.flags.writeable = False
-    return made
+    records_array = np.ascontiguousarray(rows, float).view(kind)[:, 0]
+    records_array.flags.writeable = False
+    return records_array
 
 
 def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
@@ -127,16 +127,16 @@ def _evenly_spaced(y: Array, z: Array, spacing: float) -> Array:
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
-def _first_contact(side: WheelAndRail, shift: float) -> tuple[float, Array, Array] | None:
+def _first_contact(side: WheelAndRail, lateral_shift: float) -> tuple[float, Array, Array] | None:
     """Position of first contact on the wheel (m from the taping line), all positions of the outline and their gaps (m).
     None where the profiles do not meet."""
     try:
-        pose = touching_pose(side, shift, 0.0)
+        pose = touching_pose(side, lateral_shift, 0.0)
     except InputError:
         return None
     points, gap = side.gaps(pose)
-    places = points[:, 1] - shift - side.wheelset.arm
-    return float(places[np.argmin(gap)]), places, gap
+    y_positions = points[:, 1] - lateral_shift - side.wheelset.arm
+    return float(y_positions[np.argmin(gap)]), y_positions, gap
 
 
 def _ridge_position(
@@ -149,15 +149,15 @@ def _ridge_position(
         touch = _first_contact(side, middle)
         if touch is None:
             return None
-        here, places, gap = touch
+        contact_y, y_positions, gap = touch
         low, high = sorted((touch_before[1], touch_after[1]))
         if touch_after[0] - touch_before[0] < DISPLACEMENT_STEP:
-            between = (places > low) & (places < high)
-            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE_HEIGHT else None
-        if abs(here - touch_before[1]) > abs(here - touch_after[1]):
-            touch_after = middle, here
+            between = (y_positions > low) & (y_positions < high)
+            return float(y_positions[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE_HEIGHT else None
+        if abs(contact_y - touch_before[1]) > abs(contact_y - touch_after[1]):
+            touch_after = middle, contact_y
         else:
-            touch_before = middle, here
+            touch_before = middle, contact_y
     return None
 
 

@@ -79,9 +79,9 @@ class RollingRadiusTable:
     def between(self, low: float, high: float) -> tuple[Array, Array]:
         """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
-        first, last = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
+        first, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
         ends = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first:last], high]), np.array([ends[0], *dr[first:last], ends[1]])
+        return np.array([low, *y[first:last_row], high]), np.array([ends[0], *dr[first:last_row], ends[1]])
 
     def difference(self, displacement: float, side: Any = "right") -> float:
         """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
@@ -105,8 +105,8 @@ class RollingRadiusTable:
 
     def without_every_second_row(self) -> "RollingRadiusTable":
         """The table without every second row, both ends kept; it serves to estimate the error of the spacing."""
-        kept = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
-        return replace(self, displacements=self.displacements[kept], differences=self.differences[kept])
+        kept_rows = np.unique(np.append(np.arange(0, self.displacements.size, 2), self.displacements.size - 1))
+        return replace(self, displacements=self.displacements[kept_rows], differences=self.differences[kept_rows])
 
 
 def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
@@ -114,13 +114,13 @@ def read_rolling_radii(path: str | Path) -> RollingRadiusTable:
 
     InputError names the line that is wrong.
     """
-    table = read_table(path, TABLE_COLUMNS, least=FEWEST_ROWS)
+    table = read_table(path, TABLE_COLUMNS, least_rows=FEWEST_ROWS)
     return RollingRadiusTable(table["y"], table["dr"], str(path))
 
 
 def rolling_radii_of(
-    right: WheelAndRail,
-    left: WheelAndRail,
+    right_side: WheelAndRail,
+    left_side: WheelAndRail,
     displacements: Array,
     report_progress: Callable[[float], Any] = lambda share: None,
 ) -> RollingRadiusTable:
@@ -134,7 +134,7 @@ def rolling_radii_of(
     for k, shift in enumerate(shifts.tolist()):
         report_progress(k / shifts.size)
         try:
-            rows.append((shift, *_rolling_radii(right, left, shift)))
+            rows.append((shift, *_rolling_radii(right_side, left_side, shift)))
         except InputError:
             if rows and shift > 0.0:
                 break
@@ -145,10 +145,10 @@ def rolling_radii_of(
     return RollingRadiusTable(y, of_right - of_left)
 
 
-def _rolling_radii(right: WheelAndRail, left: WheelAndRail, shift: float) -> tuple[float, float]:
+def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_shift: float) -> tuple[float, float]:
     """Rolling radii (m) of both wheels where they first touch, at a displacement (m) to the right."""
-    pose = touching_pose(right, shift, 0.0, left)
-    return rolling_radius(right, pose), rolling_radius(left, Pose(-shift, 0.0, -pose.roll, pose.fall))
+    pose = touching_pose(right_side, lateral_shift, 0.0, left_side)
+    return rolling_radius(right_side, pose), rolling_radius(left_side, Pose(-lateral_shift, 0.0, -pose.roll, pose.fall))
 
 
 def rolling_radius(side: WheelAndRail, pose: Pose) -> float:

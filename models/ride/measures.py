@@ -38,8 +38,8 @@ def dynamic_load_factor(deviation: float, static: float) -> float:
     return deviation / static
 
 
-def _check_value(**given: float) -> None:
+def _check_value(**named_values: float) -> None:
     """Raise InputError for a negative value or one that is not a number."""
-    for name, value in given.items():
+    for name, value in named_values.items():
         if not 0.0 <= value < math.inf:
             raise InputError("", name, value, "must be 0 or more, and finite")

@@ -76,8 +76,10 @@ def class_at_level(level: float) -> str:
     used."""
     if level <= 0.0:
         return "smooth"
-    place = math.log(level / level_of_class("A"), 4.0)  # whole numbers: means; halves: the limits between classes
-    name = list(DENSITY_OF_CLASS)[min(max(round(place), 0), len(DENSITY_OF_CLASS) - 1)]
+    class_number = math.log(
+        level / level_of_class("A"), 4.0
+    )  # whole numbers: means; halves: the limits between classes
+    name = list(DENSITY_OF_CLASS)[min(max(round(class_number), 0), len(DENSITY_OF_CLASS) - 1)]
     return f"{level / level_of_class(name):.2f} times the mean of ISO 8608 class {name}, one-sided"
 
 

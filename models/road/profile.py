@@ -43,7 +43,7 @@ class RoadProfile(Protocol):
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         ...
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
         ...
 
@@ -105,7 +105,7 @@ class SineProfile:
         kernels.fill_sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1.
 
         Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
@@ -113,7 +113,7 @@ class SineProfile:
         wavenumber, stays below that.
         """
         start, step = _checked_number(start, "start"), _checked_number(step, "step")
-        height, slope = np.empty(count), np.empty(count)
+        height, slope = np.empty(sample_count), np.empty(sample_count)
         kernels.sines_uniform(start, step, self.waves, height, slope)
         return height, slope
 
@@ -156,8 +156,8 @@ class SplineProfile:
         _check_order(self.name, self.station)
 
     @classmethod
-    def through(cls, station: ArrayLike, height: ArrayLike, name: str = "spline") -> "SplineProfile":
-        """C2 spline through at least 4 points: ``station`` and ``height`` (positive down) in m, shape (n,).
+    def through(cls, stations: ArrayLike, height: ArrayLike, name: str = "spline") -> "SplineProfile":
+        """C2 spline through at least 4 points: ``stations`` and ``height`` (positive down) in m, shape (n,).
 
         The ends are "not-a-knot". A natural spline would bend the first and the last few metres straight,
         an error of order h^2 where the rest has h^4, for the sake of a curvature of 0 that no measured
@@ -165,7 +165,7 @@ class SplineProfile:
         """
         from scipy.interpolate import CubicSpline
 
-        s, zeta = _read_only_copy(station, "station", 1), _read_only_copy(height, "height", 1)
+        s, zeta = _read_only_copy(stations, "station", 1), _read_only_copy(height, "height", 1)
         if s.size < 4 or zeta.shape != s.shape:
             raise InputError(name, "points", (s.size, zeta.size), "as many heights as stations, 4 or more, are needed")
         _check_order(name, s)
@@ -194,8 +194,8 @@ class SplineProfile:
     @property
     def points(self) -> HeightsAndSlopes:
         """Stations (m) and heights (m, positive down, without the window), each of shape (n,)."""
-        last = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
-        return self.station, np.append(self.coefficients[:, 3], last)
+        end_height = kernels.cubic_one(self.end, self.station, self.coefficients, 0.0)[0]
+        return self.station, np.append(self.coefficients[:, 3], end_height)
 
     def height_and_slope(self, s: ArrayLike) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
@@ -206,12 +206,12 @@ class SplineProfile:
         kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, count: int) -> HeightsAndSlopes:
+    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
         """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
         start, step = _checked_number(start, "start"), _checked_number(step, "step")
-        last = start + max(count - 1, 0) * step
-        self._check_extent(min(start, last), max(start, last))
-        height, slope = np.empty(count), np.empty(count)
+        last_station = start + max(sample_count - 1, 0) * step
+        self._check_extent(min(start, last_station), max(start, last_station))
+        height, slope = np.empty(sample_count), np.empty(sample_count)
         road = (self.station, self.coefficients, self.window_length)
         kernels.cubics_uniform(start, step, *road, height, slope)
         return height, slope
@@ -221,13 +221,15 @@ class SplineProfile:
         self._check_extent(s, s)
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
-    def _check_extent(self, first: float, last: float) -> None:
+    def _check_extent(self, first: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
-        if not (first >= begin - slack and last <= end + slack):
+        if not (first >= begin - slack and last_station <= end + slack):
             allowed = f"the road is defined from s = {begin:.6g} m to {end:.6g} m; declare how it goes on"
-            raise InputError(self.name, "arc length (m)", first if not first >= begin - slack else last, allowed)
+            raise InputError(
+                self.name, "arc length (m)", first if not first >= begin - slack else last_station, allowed
+            )
 
 
 def _read_only_copy(values: ArrayLike, field: str, dimensions: int) -> np.ndarray:
@@ -257,8 +259,10 @@ def _checked_window(length: float) -> float:
     return float(length)
 
 
-def _check_order(name: str, station: np.ndarray) -> None:
-    wrong = np.flatnonzero(np.diff(station) <= 0.0)
+def _check_order(name: str, stations: np.ndarray) -> None:
+    wrong = np.flatnonzero(np.diff(stations) <= 0.0)
     if wrong.size:
         i = int(wrong[0]) + 1
-        raise InputError(name, f"station {i}", float(station[i]), f"must be greater than {station[i - 1]:g} before it")
+        raise InputError(
+            name, f"station {i}", float(stations[i]), f"must be greater than {stations[i - 1]:g} before it"
+        )

@@ -53,26 +53,26 @@ def shape_factor(cells: int) -> float:
 
 
 @lean
-def tyre_forces(contacts, slides, strips, cells, middle, answer):
-    """Fill ``answer`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
+def tyre_forces(contacts, slides, strips, cells, middle_cells, forces_out):
+    """Fill ``forces_out`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column has no meaning. No array is
     allocated.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
     (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s);
-    strips, cells, middle : the patch's net as ``Grid`` holds it.
+    strips, cells, middle_cells : the patch's net as ``Grid`` holds it.
     """
     w = len(contacts)
-    patches, answers = records(start(contacts), w, CONTACT), records(start(answer), w, FORCES)
-    lines, along = strips_in(strips), cells_in(cells, middle)
+    patches, answers = records(start(contacts), w, CONTACT), records(start(forces_out), w, FORCES)
+    lines, cell_table = strips_in(strips), cells_in(cells, middle_cells)
     room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, slides[i, 3])
     _creepages(1.0, patches, slides)
-    forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
+    forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stacked(w, FORCES)
         _creepages(-1.0, patches, slides)
-        forces_within(patches, lines, along, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(slides, backwards, answers)
 
 
@@ -86,11 +86,11 @@ def _creepages(sign, patches, slides):
 
 
 @lean
-def _blend_directions(slides, backwards, answers):
+def _blend_directions(slides, backwards, forces_out):
     """Weighted sum of forces of forward rolling and of backward rolling; the latter are transformed to the forward
     view."""
-    for i in range(len(answers)):
-        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), answers[i], backwards[i]
+    for i in range(len(forces_out)):
+        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / FADING_SPEED)), forces_out[i], backwards[i]
         answer.fx = share * answer.fx - (1.0 - share) * behind.fx
         answer.fy = share * answer.fy + (1.0 - share) * behind.fy
         answer.mz = share * answer.mz - (1.0 - share) * behind.mz
@@ -105,9 +105,9 @@ def brush_forces(
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.
     """
     slides = np.atleast_2d(np.asarray(slides, float))
-    contacts, forces, of = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
+    contacts, forces, cell_net = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
     patches = contacts.view(CONTACT)
     patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu
     patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / stiffness
-    tyre_forces(contacts, slides, of.strips, of.cells, of.middle, forces)
+    tyre_forces(contacts, slides, cell_net.strips, cell_net.cells, cell_net.middle, forces)
     return forces[:, :3]

@@ -44,7 +44,7 @@ def identify(
     The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
-    with Crew.of(scene, usual=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *places_of(scene)) as pool:
         if folder is None:
             return uncertainty(fit(problem, None, tell, executor=pool), pool)
         store = Store(folder / STAGES_FOLDER)
@@ -60,7 +60,7 @@ def profiles_of(
     wanted = [
         k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
     ]
-    with Crew.of(scene, usual=1).at_work(len(wanted), *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(len(wanted), *places_of(scene)) as pool:
         for done, (k, made) in enumerate(
             in_order(partial(likelihood_profile, uncertainty), iter(wanted), pool), start=1
         ):

@@ -86,7 +86,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     settled, even = (varying_speed(vehicle, road, profile).deviation for profile in (change, CONSTANT_SPEED))
     often = np.linspace(stops.times[0], stops.times[-1], 41)
     stopped, fine = (
-        varying_speed(vehicle, road, stops, instants=often, reach=reach)
+        varying_speed(vehicle, road, stops, instants=often, largest_rate_times_step=reach)
         for reach in (LARGEST_RATE_TIMES_STEP, LARGEST_RATE_TIMES_STEP / 2)
     )
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2

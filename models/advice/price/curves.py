@@ -74,16 +74,16 @@ def reach(
     settings that were tried count. None where the target is not met.
     """
     table = np.array(sorted(zip(values, errors, costs, strict=True), reverse=True))
-    above = np.flatnonzero(table[:, 1] > target)
-    if not len(above):
+    rows_above = np.flatnonzero(table[:, 1] > target)
+    if not len(rows_above):
         return ToleranceCost(float(table[0, 2]), float(table[0, 0]), "coarsest")
-    last = int(above[-1])
-    if last + 1 < len(table) and not order:
-        return ToleranceCost(float(table[last + 1, 2]), float(table[last + 1, 0]), "tried")
-    if last + 1 < len(table):
-        logs = np.log(table[last : last + 2])
-        part = (logs[0, 1] - np.log(target)) / (logs[0, 1] - logs[1, 1])
-        value, _, cost = np.exp(logs[0] + part * (logs[1] - logs[0]))
+    last_above = int(rows_above[-1])
+    if last_above + 1 < len(table) and not order:
+        return ToleranceCost(float(table[last_above + 1, 2]), float(table[last_above + 1, 0]), "tried")
+    if last_above + 1 < len(table):
+        logs = np.log(table[last_above : last_above + 2])
+        fraction = (logs[0, 1] - np.log(target)) / (logs[0, 1] - logs[1, 1])
+        value, _, cost = np.exp(logs[0] + fraction * (logs[1] - logs[0]))
         return ToleranceCost(float(cost), float(value), "interpolated")
     if not (extrapolate and order):
         return None

@@ -64,30 +64,32 @@ class Steps:
         starts = speeds(contacts)
         if moving.lag is not None:
             moving.lag.reach(np.array([starts, [contact.side_speed_of_contact for contact in contacts]]), half)
-        held = self._held_wheel_forces(moving, contacts, starts, under, middle, half)
-        rates = self.vehicle.acceleration(q, v, held)
+        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, middle, half)
+        rates = self.vehicle.acceleration(q, v, wheel_forces)
         moving.accelerations[:] = self._of_units(rates)
-        rest = self.time_of_rest(moving)
-        if rest is not None:
-            moving.state[0] += rest * v + 0.5 * rest**2 * rates
+        rest_time = self.time_of_rest(moving)
+        if rest_time is not None:
+            moving.state[0] += rest_time * v + 0.5 * rest_time**2 * rates
             moving.state[1, [0, 1, 2, *self.vehicle.turns]], moving.turning[:] = 0.0, 0.0
-            return (AT_REST, rest) if rest < self.step else (self._end_status(moving), self.step)
+            return (AT_REST, rest_time) if rest_time < self.step else (self._end_status(moving), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
         moving.speed_changes[:] = (speeds(contacts) - starts) / half
-        held = self._held_wheel_forces(moving, contacts, starts, under, torques, self.step)
-        after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
-        moving.state[:], moving.turning[:] = after.reshape(2, -1), moving.report[:, SPINS]
+        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, torques, self.step)
+        states_after = march(
+            lambda _, x, u: self.vehicle.acceleration(x, u, wheel_forces), q.copy(), v.copy(), 1, self.step
+        )[-1]
+        moving.state[:], moving.turning[:] = states_after.reshape(2, -1), moving.report[:, SPINS]
         return self._end_status(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
-        none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
+        no_torques, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(2 + plane.masses.size))
         under = self._surfaces_under(state, 0.0)
-        held = self._held_wheel_forces(moving, contacts, starts, under, none, self.step)
-        return self.vehicle.acceleration(state[0], state[1], held), moving.turning
+        wheel_forces = self._held_wheel_forces(moving, contacts, starts, under, no_torques, self.step)
+        return self.vehicle.acceleration(state[0], state[1], wheel_forces), moving.turning
 
     def _end_status(self, moving: Moving) -> int:
         """How a step ends: the vehicle leans too far, a train folds, or neither."""
@@ -103,11 +105,11 @@ class Steps:
 
     def _surfaces_under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
-        plane, (place, rates) = self.course.on.plane, map(self._of_units, state)
+        plane, (position, rates) = self.course.on.plane, map(self._of_units, state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
             mine = plane.unit == k
-            paths[mine] = ground_paths(*in_row(place, rates, plane.reach[k], k), plane.place[mine], time)
+            paths[mine] = ground_paths(*in_row(position, rates, plane.reach[k], k), plane.place[mine], time)
         return under_wheels(self.course.on.road, paths, self.course.on.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:

@@ -32,8 +32,8 @@ STARTUP_SECONDS = 30.0
 class Failed(Exception):
     """Failure reported by the controller's process; what : its details as a table."""
 
-    def __init__(self, what: dict[str, Any]) -> None:
-        self.what = what
+    def __init__(self, failure: dict[str, Any]) -> None:
+        self.what = failure
         super().__init__()
 
 
@@ -96,18 +96,18 @@ class ProcessController:
             raise EOFError
         return got
 
-    def _receive_more(self, received: bytes, size: int, end: float) -> bytes:
+    def _receive_more(self, received: bytes, size: int, deadline: float) -> bytes:
         """Receive until ``size`` bytes are there, or until a complete, shorter frame reports a failure."""
         while len(received) < size and not (
             received[:4] == TOLD_MARK and HEAD_LAYOUT.size <= len(received) == _failure_length(received)
         ):
-            part = self.link.recv(size - len(received))
-            left = end - time.perf_counter()
+            received_part = self.link.recv(size - len(received))
+            left = deadline - time.perf_counter()
             if left <= 0.0:
                 raise TimeoutError
-            if not part:
+            if not received_part:
                 raise EOFError
-            received += part
+            received += received_part
             if len(received) < size:
                 self.link.settimeout(left)
         return received
@@ -118,10 +118,12 @@ def _failure_length(received: bytes) -> int:
     return HEAD_LAYOUT.size + int(HEAD_LAYOUT.unpack_from(received)[1])
 
 
-def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
-    if "place" not in what:
-        return RunFailed("controller", f"{what.get('name')}: {what.get('reason')}")
-    return InputError(what["file"], what["place"], what["value"], what["allowed"], tuple(what["choices"]))
+def _as_input(failure: dict[str, Any]) -> InputError | RunFailed:
+    if "place" not in failure:
+        return RunFailed("controller", f"{failure.get('name')}: {failure.get('reason')}")
+    return InputError(
+        failure["file"], failure["place"], failure["value"], failure["allowed"], tuple(failure["choices"])
+    )
 
 
 @contextmanager

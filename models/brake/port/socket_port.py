@@ -54,26 +54,26 @@ class SocketPort:
                 f"the connection broke: {error.strerror or error}{end_of_process(self.process, self.timeout)}",
             ) from None
 
-    def _frame(self, sample: Sample, end: float) -> bytes:
+    def _frame(self, sample: Sample, deadline: float) -> bytes:
         """Receive exactly one answer; further bytes would answer a question that has not been asked yet."""
         got = b""
         while len(got) < ANSWER_LAYOUT.size:
             try:
-                part = self.link.recv(ANSWER_LAYOUT.size + 1 - len(got))
+                received_part = self.link.recv(ANSWER_LAYOUT.size + 1 - len(got))
             except TimeoutError:
-                part = None
-            if part is None or time.perf_counter() > end:
+                received_part = None
+            if received_part is None or time.perf_counter() > deadline:
                 raise ControllerFailed(sample, "silence", f"{_received_bytes(got)} within {self.timeout:g} s")
-            if not part:
+            if not received_part:
                 raise ControllerFailed(
                     sample,
                     "crash",
                     "the connection was closed after "
                     f"{_received_bytes(got)}{end_of_process(self.process, self.timeout)}",
                 )
-            got += part
+            got += received_part
             if len(got) < ANSWER_LAYOUT.size:
-                self.link.settimeout(max(end - time.perf_counter(), 1e-6))
+                self.link.settimeout(max(deadline - time.perf_counter(), 1e-6))
         if len(got) > ANSWER_LAYOUT.size:
             raise WrongFrame("wrong length", f"an answer of more than {ANSWER_LAYOUT.size} bytes")
         return got
@@ -91,10 +91,10 @@ def end_of_process(process: subprocess.Popen[bytes] | None, patience: float) -> 
     return ""
 
 
-def _signal_name(number: int) -> str:
+def _signal_name(signal_number: int) -> str:
     with suppress(ValueError):
-        return signal.Signals(number).name
-    return f"signal {number}"
+        return signal.Signals(signal_number).name
+    return f"signal {signal_number}"
 
 
 def _received_bytes(received: bytes) -> str:
@@ -141,8 +141,8 @@ def _accepted_connection(server: socket.socket, process: subprocess.Popen[bytes]
         status = None if process is None else process.poll()
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
-    where = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
-    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {START_REMEDY}")
+    address = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
+    raise RunFailed("controller", f"silence: nobody connected to {address} within {start:g} s; {START_REMEDY}")
 
 
 @contextmanager
@@ -151,10 +151,10 @@ def _started_process(words: Sequence[str] | None, port: int, folder: Path) -> It
     if words is None:
         yield None
         return
-    said = [word.replace("{port}", str(port)) for word in words]
+    command_words = [word.replace("{port}", str(port)) for word in words]
     try:
         process = subprocess.Popen(
-            said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
+            command_words, cwd=folder, stdin=subprocess.DEVNULL, stdout=STANDARD_ERROR, start_new_session=True
         )
     except OSError as error:
         raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None

@@ -66,7 +66,12 @@ def with_error_of_drive(
             raise RunFailed(str(run.data.attrs["engine"]), "the drive cannot be repeated in other steps")
         cut = _drive_until(profile, float(wanted[-1]))
         coarse = varying_speed(
-            linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * LARGEST_RATE_TIMES_STEP
+            linear,
+            road,
+            cut,
+            weightings=scene.weighting,
+            instants=wanted,
+            largest_rate_times_step=1.01 * times * LARGEST_RATE_TIMES_STEP,
         )
         rows = np.abs(coarse.time[:, None] - wanted).argmin(axis=0)
         return series(coarse.time[rows], coarse.deviation[rows], alone(every)[::every][: len(wanted)])

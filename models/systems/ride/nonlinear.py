@@ -167,7 +167,7 @@ def _copies_by_speed(scene: RideScene, job: CopiesBySpeed, progress: Progress) -
     def tell(state: Done) -> None:
         progress(f"Monte Carlo at {state.done} of {state.paths} speeds", 0.3 + 0.4 * state.done / state.paths)
 
-    with Crew.of(scene, usual=1).at_work(len(job.speeds)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(len(job.speeds)) as pool:
         made = run_paths(job, len(job.speeds), None, pool, Blocks(1), tell)
     return {
         speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))

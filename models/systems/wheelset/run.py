@@ -166,7 +166,7 @@ def branch_result(
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    with Crew.of(scene, usual=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(PAIRS_OF_MARCHES, *places_of(scene)) as pool:
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)

@@ -136,7 +136,11 @@ def _sample_of_drive(rng: np.random.Generator, number: int) -> Sample:
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
     fine = varying_speed(
-        linear_vehicle(vehicle)(ANY_SPEED), road, profile, instants=result.times, reach=LARGEST_RATE_TIMES_STEP / 8.0
+        linear_vehicle(vehicle)(ANY_SPEED),
+        road,
+        profile,
+        instants=result.times,
+        largest_rate_times_step=LARGEST_RATE_TIMES_STEP / 8.0,
     )
     rows = np.abs(fine.time[:, None] - result.times).argmin(axis=0)
     gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
