@@ -59,12 +59,12 @@ def write_plain_table(source: Path, target: Path) -> Path:
     period = float(np.median(np.diff(raw["t"])))
     columns = {name: (unit, raw[column][::KEPT_SAMPLE_INTERVAL]) for name, (column, unit) in RACE_COLUMNS.items()}
     for name, (column, unit) in list(RACE_COLUMNS.items())[1:]:
-        kept = without_outliers(raw[column])
-        known = np.isfinite(kept)
-        whole = np.interp(raw["t"], raw["t"][known], kept[known])
+        cleaned = without_outliers(raw[column])
+        known = np.isfinite(cleaned)
+        filled = np.interp(raw["t"], raw["t"][known], cleaned[known])
         columns[name] = (
             unit,
-            low_passed(whole[:, None], period, 0.25 / period, str(source), column)[::KEPT_SAMPLE_INTERVAL, 0],
+            low_passed(filled[:, None], period, 0.25 / period, str(source), column)[::KEPT_SAMPLE_INTERVAL, 0],
         )
     write_table(target, columns)
     return target

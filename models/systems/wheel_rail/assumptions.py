@@ -80,7 +80,7 @@ def _elastic_assumption() -> Assumption:
         "elastic",
         "the steel does not flow",
         "lower wheelset.load: a real contact would be larger and its pressure lower",
-        _extreme_of_patches(lambda place: 1e-6 * place.peak),
+        _extreme_of_patches(lambda patch: 1e-6 * patch.peak),
         "MPa",
         upper_limit=1e-6 * YIELDS,
     )
@@ -105,7 +105,7 @@ def _slow_slip(speed: float) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give the case's friction as it is for such slip, or lower wheelset.speed",
-        _extreme_of_patches(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
+        _extreme_of_patches(lambda patch: speed * float(np.hypot(patch.xi_x, patch.xi_y))),
         "m/s",
         upper_limit=FAST_SLIP,
     )

@@ -95,15 +95,19 @@ class Accelerometers:
         from models.sensors.sensor_array import on_bracket, sensor_readings
 
         p, y = self.parameters, run.states[rows]
-        moved = np.array([model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows])
-        places = np.array(list(p.positions().values()))
-        values = sensor_readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
+        accelerations = np.array(
+            [model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows]
+        )
+        sensor_positions = np.array(list(p.positions().values()))
+        values = sensor_readings(
+            sensor_positions, y[:, 3], y[:, 7], accelerations[:, 2], accelerations[:, 3], assembly.parameters.g
+        )
         for i, sensor in enumerate(p.sensors.values()):
             if sensor.bracket is not None:
                 values[:, i] = on_bracket(
                     values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
                 )
-        noise = normal_samples(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
+        noise = normal_samples(p.seed, p.path, len(values), 3 * len(sensor_positions), source=ACCELEROMETERS)
         return values + p.deviation * noise.reshape(values.shape)
 
 
@@ -115,5 +119,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
         for sensor, channels in zip(p.sensors, channels_of_sensors(p), strict=True)
         for axis, channel in zip("xyz", channels, strict=True)
     }
-    kept = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
-    return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, kept))
+    range_assumption = within_range("accelerometers", axes, "m/s^2", p.range or USUAL_RANGE)
+    return replace(
+        assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, range_assumption)
+    )

@@ -81,8 +81,8 @@ def _check_keys(file: str, p: Parameters) -> None:
     keys = {name: value for name, value in p if name not in ("source", "speed") and value is not None}
     for name, value in keys.items():
         if name not in KEYS_OF_SOURCE[p.source]:
-            taken = ", ".join(("speed", *KEYS_OF_SOURCE[p.source]))
-            allowed = f"has no meaning for source = {p.source!r}, which takes {taken}"
+            accepted_keys = ", ".join(("speed", *KEYS_OF_SOURCE[p.source]))
+            allowed = f"has no meaning for source = {p.source!r}, which takes {accepted_keys}"
             raise InputError(file, f"effects.road.{name}", value, allowed)
     for name in NEEDED.get(p.source, ()):
         if name not in keys:
