@@ -88,8 +88,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             scale *= PUBLISHED_FIGURES["deceleration"] / means["deceleration"].mean
             steer *= PUBLISHED_FIGURES["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
-        last = fitted_scene(scene, options, scale, steer)
-        scatters = _means_of_stops(last, options, options.last, pool, options.seed + 1)
+        fitted = fitted_scene(scene, options, scale, steer)
+        scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
     by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs)
@@ -97,9 +97,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
-    stop = drive(last, procedure=options.procedure, error=scene.error)
+    stop = drive(fitted, procedure=options.procedure, error=scene.error)
     stop.save(folder / "calibration.nc")
-    stop_figure(last, options.procedure, {"as fitted": stop}, folder / "calibration.png")
+    stop_figure(fitted, options.procedure, {"as fitted": stop}, folder / "calibration.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -142,9 +142,9 @@ def table(options: Options, scale: float, steer: float, scatters: dict[str, Scat
         f"  means of {options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
-    for key, (label, simulated, measured, how) in PAPER_VALUES.items():
-        here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
-        lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")
+    for key, (label, simulated, measured, kind_of_value) in PAPER_VALUES.items():
+        simulated_here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
+        lines.append(f"    {label:<34}{simulated_here:>18}   {simulated:<36}{measured:<18}{kind_of_value}")
     return lines
 
 

@@ -165,15 +165,15 @@ def _from_file(name: str, path: Path, p: Parameters) -> Source:
 def _run(scene: Scene, engine: str, folder: Path) -> Source:
     """One engine's run; its readings go through a file as measured ones do."""
     p = scene.effects["accelerometers"]
-    made = simulate(scene, engine, error=scene.error)
+    computed = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
-    write(made, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
+    write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _from_file(engine, path, p)
-    rows = np.searchsorted(made.times, source.period * (np.arange(len(source.readings)) - 1e-3))
+    rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}
-    source.truth = {name: made[channel][rows] for name, channel in wanted.items()}
-    source.run = made
-    source.gyro = made["gyro"][rows] if "gyro" in made.data else None
+    source.truth = {name: computed[channel][rows] for name, channel in wanted.items()}
+    source.run = computed
+    source.gyro = computed["gyro"][rows] if "gyro" in computed.data else None
     return source
 
 
@@ -182,22 +182,24 @@ def _recover_motions(source: Source, array: SensorArray, options: Options, p: Pa
     first method only."""
     source.quality = fit_quality(array, source.readings, p.deviation)
     suspect, readings = source.quality.suspect, source.readings
-    moved = partial(recovered_motion, sample_period=source.period, start=source.start, zeroed=options.zeroed)
+    recover = partial(recovered_motion, sample_period=source.period, start=source.start, zeroed=options.zeroed)
     if suspect:
-        source.recovered_motions["all sensors, integrated"] = moved(array, readings)
+        source.recovered_motions["all sensors, integrated"] = recover(array, readings)
         readings = readings[:, [name != suspect for name in array.names]]
-        array = sensor_array({name: place for name, place in p.positions().items() if name != suspect})
-    source.recovered_motions["integrated"] = moved(array, readings)
+        array = sensor_array(
+            {name: sensor_position for name, sensor_position in p.positions().items() if name != suspect}
+        )
+    source.recovered_motions["integrated"] = recover(array, readings)
     if p.deviation > 0:
-        held, _ = filter_rates(
+        filtered_rates, _ = filter_rates(
             spin_from_readings(array, readings), source.period, np.array(source.start.rates), p.deviation
         )
-        source.recovered_motions["rates held by w w^T"] = moved(array, readings, rates=held)
+        source.recovered_motions["rates held by w w^T"] = recover(array, readings, rates=filtered_rates)
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
-        source.recovered_motions["rates from the gyro"] = moved(array, readings, rates=turning)
+        source.recovered_motions["rates from the gyro"] = recover(array, readings, rates=turning)
     cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
-    source.recovered_motions["high-passed"] = moved(array, readings, cut_offs=cut_offs)
+    source.recovered_motions["high-passed"] = recover(array, readings, cut_offs=cut_offs)
 
 
 def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
@@ -208,26 +210,26 @@ def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
 def _save_motions(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and one result with all methods, which is
     returned."""
-    stem, ways = (
+    stem, values_of_methods = (
         Path(source.name).stem,
-        {way: _compared_values(moved) for way, moved in source.recovered_motions.items()},
+        {method_name: _compared_values(motion) for method_name, motion in source.recovered_motions.items()},
     )
-    for way, moved_values in ways.items():
+    for method_name, moved_values in values_of_methods.items():
         columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
-        write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
+        write_time_series(folder / f"{stem}, {method_name}.csv", columns, source.period)
     channels = {
-        name: Channel(("way", "time"), [moved_values[name] for moved_values in ways.values()], unit)
+        name: Channel(("way", "time"), [moved_values[name] for moved_values in values_of_methods.values()], unit)
         for name, (_, unit) in COMPARED_CHANNELS.items()
     }
-    times = source.period * np.arange(len(source.readings))
-    axes = {"way": Channel("way", list(ways)), "time": Channel("time", times, "s")}
+    reading_times = source.period * np.arange(len(source.readings))
+    axes = {"way": Channel("way", list(values_of_methods)), "time": Channel("time", reading_times, "s")}
     saved = result(scene, channels, axes, engine=source.name)
     assert source.quality is not None
     record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
     with_assumptions(saved, assumptions(record, source.recovered_motions["integrated"]))
     if scene.error:
-        beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
-        not_estimated(saved, f"noise and mounts err most, and {beside}")
+        truth_text = "the table has the error of each way beside the run" if source.truth else "no truth is known"
+        not_estimated(saved, f"noise and mounts err most, and {truth_text}")
     saved.save(folder / f"{stem} moved_values.nc")
     return saved
 
@@ -236,12 +238,14 @@ def _numbers_of_ways(source: Source) -> dict[str, Any]:
     """Plain numbers of the recovered motion. They hold the share of misfit in the readings, the suspect sensor, and the
     largest and rms error of each method; without a true motion, the largest and rms value in place of errors."""
     assert source.quality is not None
-    ways = {}
-    for way, moved in source.recovered_motions.items():
-        errors = {name: values - source.truth.get(name, 0.0) for name, values in _compared_values(moved).items()}
-        ways[way] = {name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()}
-    told = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
-    return {"source": source.name, **told, "ways": ways}
+    errors_of_methods = {}
+    for method_name, motion in source.recovered_motions.items():
+        errors = {name: values - source.truth.get(name, 0.0) for name, values in _compared_values(motion).items()}
+        errors_of_methods[method_name] = {
+            name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()
+        }
+    quality_facts = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
+    return {"source": source.name, **quality_facts, "ways": errors_of_methods}
 
 
 def _screen_lines(source: Source, p: Parameters) -> list[str]:
@@ -254,12 +258,12 @@ def _screen_lines(source: Source, p: Parameters) -> list[str]:
         f"    {_rigidity_text(source.quality)}",
         f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}",
     ]
-    for way, errors in numbers["ways"].items():
+    for method_name, errors in numbers["ways"].items():
         cells = [
             f"{scale * errors[name][0]:.3g} ({scale * errors[name][1]:.2g})"
             for name, scale in (("pitch", 1e3), ("rate", 1.0), ("heave", 1.0))
         ]
-        lines.append(f"    {way:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
+        lines.append(f"    {method_name:<28}{cells[0]:>20}{cells[1]:>20}{cells[2]:>20}")
     if p.deviation == 0:
         lines.append("    rates held by w w^T: not made, as the scene states no noise (deviation) to weigh it with")
     return lines
@@ -306,7 +310,7 @@ def _figure(source: Source, results: Results, path: Path) -> None:
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
 
     assert source.quality is not None
-    times = source.period * np.arange(len(source.readings))
+    reading_times = source.period * np.arange(len(source.readings))
     rows: list[Any] = [
         ["pitch", "heave"],
         *([["pitch error", "heave error"]] if source.truth else []),
@@ -315,17 +319,28 @@ def _figure(source: Source, results: Results, path: Path) -> None:
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
     for axis in axes.values():
         axis.xaxis.set_tick_params(labelbottom=True)
-    ways = {way: _compared_values(motion) for way, motion in source.recovered_motions.items()}
+    motions = {method_name: _compared_values(motion) for method_name, motion in source.recovered_motions.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
         _plot_motions(
-            axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name
+            axes[name],
+            reading_times,
+            {method_name: scale * motion[name] for method_name, motion in motions.items()},
+            label,
+            source,
+            name,
         )
         if source.truth:
-            errors = {way: scale * np.abs(motion[name] - source.truth[name]) for way, motion in ways.items()}
+            errors = {
+                method_name: scale * np.abs(motion[name] - source.truth[name])
+                for method_name, motion in motions.items()
+            }
             _plot_errors(
-                axes[f"{name} error"], times, errors, f"Largest error of the {name} so far {label[label.index('[') :]}"
+                axes[f"{name} error"],
+                reading_times,
+                errors,
+                f"Largest error of the {name} so far {label[label.index('[') :]}",
             )
-    axes["misfit"].plot(times, source.quality.misfit, color=GREY, linewidth=0.4)
+    axes["misfit"].plot(reading_times, source.quality.misfit, color=GREY, linewidth=0.4)
     axes["misfit"].set_title(f"Readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s²]")
     axes["misfit"].set_xlabel("time [s]")
     legend_below(figure, axes["pitch error" if source.truth else "pitch"], columns=3)
@@ -334,7 +349,7 @@ def _figure(source: Source, results: Results, path: Path) -> None:
 
 
 def _plot_motions(
-    axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str
+    axis: Any, times: np.ndarray, values_of_methods: dict[str, np.ndarray], title: str, source: Source, name: str
 ) -> None:
     """Plot the true motion where it is known, since good methods would only cover it; else the motion by each
     method."""
@@ -344,15 +359,15 @@ def _plot_motions(
         axis.plot(times, (1e3 if name == "pitch" else 1.0) * source.truth[name], color=TRUTH_COLOUR)
         axis.set_title(f"True {title[0].lower()}{title[1:]}")
         return
-    for way, values in ways.items():
-        axis.plot(times, values, linewidth=0.9, label=way)
+    for method_name, values in values_of_methods.items():
+        axis.plot(times, values, linewidth=0.9, label=method_name)
     axis.set_title(title)
 
 
 def _plot_errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
     """Plot the largest error of each method up to every time, on a logarithmic scale."""
-    for way, error in errors.items():
-        axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
+    for method_name, error in errors.items():
+        axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=method_name)
     axis.set_title(title)
 
 

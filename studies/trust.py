@@ -71,19 +71,21 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     options = check(scene, engines)
     base, measured, largest = _forces(scene, options, folder)
     deviation, assembly = options.noise_fraction * largest, assembly_of_scene(base)
-    other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
+    other_parameters = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
     curves = {
         "noise": noise(assembly, deviation),
         "interpolation": interpolation(assembly),
-        "inertia": model_error_curve(assembly, other),
+        "inertia": model_error_curve(assembly, other_parameters),
         "rounding": rounding_error_curve(assembly),
     }
     runs = {}
     if measured is not None:
         progress("runs", 0.2)
         clean = run_away(base, engines[0])
-        wrong = run_away(changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
+        wrong = run_away(
+            changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
+        )
         runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     quiet = run_away(base, "reference", scene.error)
@@ -136,26 +138,26 @@ def _error(run: Result, pitch: np.ndarray) -> GrowthCurve:
 
 
 def _ensemble_of_paths(
-    base: Scene, quiet: Result, deviation: float, options: Options, engine: str, crew: Crew
+    base_scene: Scene, quiet_run: Result, deviation: float, options: Options, engine: str, worker_crew: Crew
 ) -> dict[str, np.ndarray]:
     """Run the noise paths; return their drift-off times (paths,) and their pitch errors (paths, rows) relative to the
-    run without noise, ``quiet``.
+    run without noise, ``quiet_run``.
 
     The errors are nan from where a path left all bounds.
     """
-    noisy = changed_scene(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
-    rows = np.arange(0, len(quiet.times), max(1, round(ROW_SPACING / base.run.step)))
-    times, true = quiet.times[rows], quiet["pitch"]
-    with crew.at_work(Blocks().count(options.paths)) as pool:
-        paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths, executor=pool)
+    noisy = changed_scene(base_scene, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
+    rows = np.arange(0, len(quiet_run.times), max(1, round(ROW_SPACING / base_scene.run.step)))
+    row_times, true = quiet_run.times[rows], quiet_run["pitch"]
+    with worker_crew.at_work(Blocks().count(options.paths)) as pool:
+        paths = run_paths(noise_paths(noisy, row_times, true, options.angle, engine), options.paths, executor=pool)
     errors = np.abs(paths["states"][:, :, 3] - true[rows])
-    return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
+    return {"times": row_times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _with_errors(result: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+def _with_errors(result: Result, quiet_run: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
     """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
     median."""
-    result.data.attrs["error"] = quiet.data.attrs["error"]
+    result.data.attrs["error"] = quiet_run.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
     middle, low, high = quantile_with_interval(spread["drift_off"], 0.5)
     if not math.isfinite(high):
@@ -194,8 +196,8 @@ def _drift_off_rows(
     for name, curve in curves.items():
         measured, quartiles = runs[name].passing_time(options.angle) if name in runs else None, None
         if name == "noise":
-            times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
-            measured, *quartiles = [time if math.isfinite(time) else None for time in times]
+            drift_off_times = [quantile_with_interval(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            measured, *quartiles = [time if math.isfinite(time) else None for time in drift_off_times]
         rows.append(
             {
                 "source": name,
@@ -208,7 +210,7 @@ def _drift_off_rows(
 
 
 def _text(
-    rows: list[Row], options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
+    rows: list[Row], options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines for the terminal: predicted and measured drift-off times, and what a longer trustworthy run would
     require."""
@@ -226,7 +228,7 @@ def _text(
         if rate
         else f"  trusted {until}; a tilt error does not grow exponentially"
     )
-    return lines + _remedy_lines(options, deviation, rate, base, curves)
+    return lines + _remedy_lines(options, deviation, rate, base_scene, curves)
 
 
 def _drift_off_text(time: float | None) -> str:
@@ -243,16 +245,16 @@ def _measured_text(row: Row) -> str:
 
 
 def _remedy_lines(
-    options: Options, deviation: float, rate: float, base: Scene, curves: dict[str, GrowthCurve]
+    options: Options, deviation: float, rate: float, base_scene: Scene, curves: dict[str, GrowthCurve]
 ) -> list[str]:
     """Lines on what noise, sampling rate and known inertia a trustworthy run of the wanted length would need,
     extrapolated by the growth rate of errors."""
-    forces = assembly_of_scene(base).input
+    forces = assembly_of_scene(base_scene).input
     assert forces is not None and forces.period is not None
     lines = [f"  for {options.wanted:g} s it would take:"]
     for name in ("noise", "interpolation", "inertia"):
         excess = _size_at_time(curves[name], options, rate)
-        order = ORDER_OF_RULE[base.effects["wheel_forces"].interpolation]
+        order = ORDER_OF_RULE[base_scene.effects["wheel_forces"].interpolation]
         takes = {
             "noise": f"noise of {deviation / excess:.2g} N instead of {deviation:.3g} N on each sample",
             "interpolation": f"samples at {excess ** (1 / order) / forces.period:.3g} Hz instead of "

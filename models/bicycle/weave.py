@@ -75,14 +75,14 @@ def observations(folder: str | Path) -> list[Observation]:
     folder, rows = Path(folder), _rows_of_windows(Path(folder) / "windows.csv")
     recordings = {label: _columns_of_recording(folder, label) for label in {row[0] for row in rows}}
     by_speed = dict[float, list[tuple[complex, float, float]]]()
-    for line, (label, speed, first, last_sample) in enumerate(rows, 2):
+    for line, (label, speed, first_sample, last_sample) in enumerate(rows, 2):
         recording = recordings[label]
         if last_sample >= len(recording["speed"]):
             allowed = f"the recording has {len(recording['speed'])} samples"
             raise InputError(folder / "windows.csv", f"line {line}, last sample", last_sample, allowed)
-        lean, steer, sensor = (recording[name][first : last_sample + 1] for name in COLUMN_HEADINGS)
+        lean, steer, sensor = (recording[name][first_sample : last_sample + 1] for name in COLUMN_HEADINGS)
         if not np.isfinite([lean, steer, sensor]).all() or not np.any(steer) or np.ptp(lean) == 0.0:
-            raise InputError(folder / "windows.csv", f"line {line}", first, "gaps, or no motion, in this window")
+            raise InputError(folder / "windows.csv", f"line {line}", first_sample, "gaps, or no motion, in this window")
         slowness = np.abs(steer).mean() / np.mean(steer**2)
         by_speed.setdefault(speed, []).append((decaying_sinusoid(lean), float(sensor.mean()), float(slowness)))
     for speed, of_speed in by_speed.items():

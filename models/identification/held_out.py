@@ -39,11 +39,11 @@ class Identified:
 
 
 def identified_vehicle(
-    first: Any, second_stretch: Any, search: Search, progress: Progress = lambda text, share: None
+    first_stretch: Any, second_stretch: Any, search: Search, progress: Progress = lambda text, share: None
 ) -> Identified:
     """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
     with bands."""
-    problem = _fit_problem(first, search)
+    problem = _fit_problem(first_stretch, search)
     solved = fit(problem, report_stage=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
     crossed = cross_validated(solved, search.blocks, progress)

@@ -155,13 +155,13 @@ def _stationary_covariance(jacobian: np.ndarray, residuals: np.ndarray, lags: in
     return total
 
 
-def _larger_covariance(first: np.ndarray, second_covariance: np.ndarray) -> np.ndarray:
+def _larger_covariance(first_covariance: np.ndarray, second_covariance: np.ndarray) -> np.ndarray:
     """A covariance (p, p) that is at least as large as both given ones in every direction. Scores account for where
     residuals are large, but scatter more."""
     values, vectors = np.linalg.eigh(second_covariance)
     values = np.maximum(values, SINGULAR_SHARE * values[-1])
     root, back = (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
-    ratios, principal_axes = np.linalg.eigh(back @ first @ back)
+    ratios, principal_axes = np.linalg.eigh(back @ first_covariance @ back)
     return root @ (principal_axes * np.maximum(ratios, 1.0)) @ principal_axes.T @ root
 
 

@@ -92,11 +92,11 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | 
     where there are several and ``guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
-    first, last_displacement = table.ends
-    if 0.0 <= 2.0 * amplitude - (last_displacement - first) <= AMPLITUDE_TOLERANCE * amplitude:
-        amplitude = (last_displacement - first) / 2.0
-    if 2.0 * amplitude > last_displacement - first:
-        table_range = f"the table goes from {first:g} to {last_displacement:g}"
+    first_displacement, last_displacement = table.ends
+    if 0.0 <= 2.0 * amplitude - (last_displacement - first_displacement) <= AMPLITUDE_TOLERANCE * amplitude:
+        amplitude = (last_displacement - first_displacement) / 2.0
+    if 2.0 * amplitude > last_displacement - first_displacement:
+        table_range = f"the table goes from {first_displacement:g} to {last_displacement:g}"
         allowed = f"is half of peak to peak, and {table_range}: it cannot hold the wave"
         raise InputError(table.source, "amplitude", amplitude, allowed)
     waves = [
@@ -207,16 +207,17 @@ def _without_wave(table: RollingRadiusTable, amplitude: float) -> KlingelWave:
     idle = _idle_centre(table, amplitude)
     if idle is not None:
         return KlingelWave(amplitude, idle, math.inf)
-    dr, (first, last_displacement) = table.differences, table.ends
-    rises = table.difference(last_displacement, "left") - table.difference(first)
+    dr, (first_displacement, last_displacement) = table.differences, table.ends
+    rises = table.difference(last_displacement, "left") - table.difference(first_displacement)
     if (dr >= 0.0).all() or (dr <= 0.0).all():
         why = (
-            f"has no wave: dr does not change its sign from {first:g} to {last_displacement:g}, so that nothing swings"
+            f"has no wave: dr does not change its sign from {first_displacement:g} to {last_displacement:g}, "
+            "so that nothing swings"
         )
     elif rises < 0.0:
         why = "has no wave: dr falls with the displacement; is it left less right? Right less left is wanted"
     else:
-        table_range = f"from {first:g} to {last_displacement:g}"
+        table_range = f"from {first_displacement:g} to {last_displacement:g}"
         why = f"has no wave within the table, {table_range}: it would swing beyond, or not come across"
     raise InputError(table.source, "amplitude", amplitude, why)
 

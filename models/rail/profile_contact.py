@@ -215,12 +215,16 @@ def settle_depths(touches, modulus):
 
 
 @lean
-def _cosine_of_normals(first, second_touch, squares):
+def _cosine_of_normals(first_touch, second_touch, squares):
     """Ratio (1/m) of the cosine between the normals of two touches to their distance, which ``squares`` enlarge."""
     squared_distance = (
-        (first.x - second_touch.x) ** 2 + (first.y - second_touch.y) ** 2 + (first.z - second_touch.z) ** 2
+        (first_touch.x - second_touch.x) ** 2
+        + (first_touch.y - second_touch.y) ** 2
+        + (first_touch.z - second_touch.z) ** 2
     )
-    return (first.n_y * second_touch.n_y + first.n_z * second_touch.n_z) / math.sqrt(squared_distance + squares / 5.0)
+    return (first_touch.n_y * second_touch.n_y + first_touch.n_z * second_touch.n_z) / math.sqrt(
+        squared_distance + squares / 5.0
+    )
 
 
 @lean

@@ -79,9 +79,9 @@ class RollingRadiusTable:
     def between(self, low: float, high: float) -> tuple[Array, Array]:
         """Displacements and differences of the section from ``low`` to ``high``, including both ends."""
         y, dr = self.displacements, self.differences
-        first, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
+        first_row, last_row = int(np.searchsorted(y, low, "right")), int(np.searchsorted(y, high, "left"))
         ends = self.difference(low, "right"), self.difference(high, "left")
-        return np.array([low, *y[first:last_row], high]), np.array([ends[0], *dr[first:last_row], ends[1]])
+        return np.array([low, *y[first_row:last_row], high]), np.array([ends[0], *dr[first_row:last_row], ends[1]])
 
     def difference(self, displacement: float, side: Any = "right") -> float:
         """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""

@@ -238,11 +238,11 @@ class _Queue:
         return removed
 
 
-def _sum_of_products(first: np.ndarray, second_responses: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _sum_of_products(first_responses: np.ndarray, second_responses: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Sum over points and channels of the products of two responses, both (n, c, k), weighted with the points' weights
     (c,)."""
-    n = len(first)
-    return (first * weight[:, None]).reshape(n, -1) @ second_responses.reshape(n, -1).T
+    n = len(first_responses)
+    return (first_responses * weight[:, None]).reshape(n, -1) @ second_responses.reshape(n, -1).T
 
 
 def _delayed_responses(road_in_path: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:

@@ -76,10 +76,10 @@ def read_tracks(
     track_width: float = TRACK_WIDTH,
     *,
     offset: float = 0.0,
-    first: float | None = None,
+    first_station: float | None = None,
     last_station: float | None = None,
 ) -> MeasuredTracks:
-    """Left and right track of an OpenCRG or CSV road, from ``first`` to ``last_station`` (m along the road).
+    """Left and right track of an OpenCRG or CSV road, from ``first_station`` to ``last_station`` (m along the road).
 
     track_width : m between the tracks; a CSV file does not tell it. offset : m, of their middle, to the left; OpenCRG
     only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
@@ -97,7 +97,10 @@ def read_tracks(
         left, right = (read_opencrg(path, side, offset=offset, track_width=track_width) for side in ("left", "right"))
     else:
         raise InputError(path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
-    start, end = (left.start if first is None else first), (left.end if last_station is None else last_station)
+    start, end = (
+        (left.start if first_station is None else first_station),
+        (left.end if last_station is None else last_station),
+    )
     if not left.start <= start < end <= left.end:
         raise InputError(path, "section (m)", (start, end), f"must lie between {left.start:g} and {left.end:g}")
     step = left.finest

@@ -221,14 +221,17 @@ class SplineProfile:
         self._check_extent(s, s)
         return kernels.cubic_one(float(s), self.station, self.coefficients, self.window_length)
 
-    def _check_extent(self, first: float, last_station: float) -> None:
+    def _check_extent(self, first_station: float, last_station: float) -> None:
         """Refuse arc lengths outside the road, where extrapolated polynomials would not be a road."""
         slack = OVERRUN_SHARE * (self.end - self.start)
         begin, end = self.extent
-        if not (first >= begin - slack and last_station <= end + slack):
+        if not (first_station >= begin - slack and last_station <= end + slack):
             allowed = f"the road is defined from s = {begin:.6g} m to {end:.6g} m; declare how it goes on"
             raise InputError(
-                self.name, "arc length (m)", first if not first >= begin - slack else last_station, allowed
+                self.name,
+                "arc length (m)",
+                first_station if not first_station >= begin - slack else last_station,
+                allowed,
             )
 
 

@@ -70,15 +70,15 @@ def _predict_rates(filter_: _Rates, alpha: np.ndarray, sample_period: float, pla
     filter_.predict(sample_period * change)
 
 
-def _skew_squared_entries(w: np.ndarray, first: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
+def _skew_squared_entries(w: np.ndarray, first_axis: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
     """Entries of skew(w)^2 = w w^T - |w|^2 I."""
-    return w[first] * w[second_axis] - (first == second_axis) * (w @ w)
+    return w[first_axis] * w[second_axis] - (first_axis == second_axis) * (w @ w)
 
 
-def _rate_product_jacobian(w: np.ndarray, first: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
+def _rate_product_jacobian(w: np.ndarray, first_axis: np.ndarray, second_axis: np.ndarray) -> np.ndarray:
     """Derivatives (entries, 3) of the measured rate products by the angular rate w."""
     return (
-        w[first, None] * UNIT_MATRIX[second_axis]
-        + w[second_axis, None] * UNIT_MATRIX[first]
-        - 2 * (first == second_axis)[:, None] * w
+        w[first_axis, None] * UNIT_MATRIX[second_axis]
+        + w[second_axis, None] * UNIT_MATRIX[first_axis]
+        - 2 * (first_axis == second_axis)[:, None] * w
     )

@@ -116,9 +116,9 @@ def _check_turned(rates: np.ndarray, sample_period: float) -> None:
 def cubic_integrals(values: np.ndarray, sample_period: float) -> np.ndarray:
     """Integrals (n - 1, ...) over each period of the cubics through four neighbouring samples (n, ...), n >= 4."""
     inner = -values[:-3] + 13 * values[1:-2] + 13 * values[2:-1] - values[3:]
-    first = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
+    first_integral = 9 * values[0] + 19 * values[1] - 5 * values[2] + values[3]
     last_integral = 9 * values[-1] + 19 * values[-2] - 5 * values[-3] + values[-4]
-    return sample_period / 24 * np.concatenate([first[None], inner, last_integral[None]])
+    return sample_period / 24 * np.concatenate([first_integral[None], inner, last_integral[None]])
 
 
 def integrate(rates: np.ndarray, sample_period: float, start: np.ndarray, rule: Rule = "cubic") -> np.ndarray:

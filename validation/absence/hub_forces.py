@@ -87,4 +87,4 @@ def _noisy_columns(measurement: Measurement) -> list[int]:
         return [0, 0]
     clean = recorded_measurement(measurement.truth, scene.forces.frame, round(forces.period / scene.run.step))
     pairs = ((forces.samples, clean[0].samples), (angles.samples, clean[1].samples))
-    return [int((told != true).any(axis=0).sum()) for told, true in pairs]
+    return [int((measured != true).any(axis=0).sum()) for measured, true in pairs]

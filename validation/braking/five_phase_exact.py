@@ -32,8 +32,8 @@ class Piece:
     at a constant rate (N m/s)."""
 
     def __init__(self, wheel: ExactWheel, i: int, s0: float, torque: float, rate: float) -> None:
-        way = wheel.slips[i + 1] - wheel.slips[i]
-        c = (wheel.forces[i + 1] - wheel.forces[i]) / way
+        cell_width = wheel.slips[i + 1] - wheel.slips[i]
+        c = (wheel.forces[i + 1] - wheel.forces[i]) / cell_width
         f0 = wheel.forces[i] - c * wheel.slips[i]
         per = wheel.radius / (wheel.inertia * wheel.speed)
         self.s0, self.v, self.k = s0, wheel.speed, per * wheel.radius * c
@@ -72,17 +72,17 @@ class Piece:
             time = -math.log(share) / self.k if share > 0.0 else math.inf
         return time if time > 0.0 else math.inf
 
-    def leaves(self, low: float, high: float, until: float) -> tuple[float, int]:
-        """First time before ``until`` at which the slip leaves its cell, and through which node: -1 lower, 1 upper.
-        Returns ``until`` and 0 if it stays."""
-        turn = min(self.meets(0.0), until)
-        for start, end in ((0.0, turn), (turn, until)):
+    def leaves(self, low: float, high: float, end_time: float) -> tuple[float, int]:
+        """First time before ``end_time`` at which the slip leaves its cell, and through which node: -1 lower, 1 upper.
+        Returns ``end_time`` and 0 if it stays."""
+        turn = min(self.meets(0.0), end_time)
+        for start, end in ((0.0, turn), (turn, end_time)):
             for node, side in ((low, -1), (high, 1)):
                 if end > start and side * (self.slip(end) - node) > 0.0:
                     if side * (self.slip(start) - node) >= 0.0:
                         return start, side
                     return _root_in_piece(lambda t, node=node: self.slip(t) - node, start, end), side  # type: ignore[misc]
-        return until, 0
+        return end_time, 0
 
 
 def _root_in_piece(function: Callable[[float], float], low: float, high: float) -> float:
@@ -123,10 +123,10 @@ def last_cycle(wheel: ExactWheel, phases: list[tuple[float, float, float]], cycl
 
     phases : rate of torque (N m/s), sign and level of the end, of the beginning and of phases 1 to 5.
     """
-    at = [0.0, 0.0, 0.0, 0.0]
-    advance_phase(wheel, at, *phases[0])
+    wheel_state = [0.0, 0.0, 0.0, 0.0]
+    advance_phase(wheel, wheel_state, *phases[0])
     for _ in range(cycles):
-        at[2:] = [0.0, 0.0]
+        wheel_state[2:] = [0.0, 0.0]
         for later in phases[1:]:
-            advance_phase(wheel, at, *later)
-    return at[2], at[3] / at[2] / float(wheel.forces.max())
+            advance_phase(wheel, wheel_state, *later)
+    return wheel_state[2], wheel_state[3] / wheel_state[2] / float(wheel.forces.max())

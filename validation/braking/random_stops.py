@@ -24,9 +24,9 @@ class Draw:
         """A random number, uniform between low and high."""
         return float(self.random.uniform(low, high))
 
-    def integer(self, low: int, end: int) -> int:
+    def integer(self, low: int, upper_limit: int) -> int:
         """A random integer from low to below the end."""
-        return int(self.random.integers(low, end))
+        return int(self.random.integers(low, upper_limit))
 
     def choice(self, *choices: Any) -> Any:
         """A random element of ``choices``, all equally likely."""
@@ -37,12 +37,12 @@ class Draw:
         return bool(self.random.random() < share)
 
 
-def random_stop(seed: int, number: int) -> dict[str, Any]:
+def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
     """Table of one random scene; equal arguments give equal scenes."""
-    draw = Draw(np.random.default_rng([seed, number]))
+    draw = Draw(np.random.default_rng([seed, scene_number]))
     kind = draw.choice("straight", "straight", "split", "j_turn", "j_turn", "turn")
     table: dict[str, Any] = {
-        "title": f"stop {number}",
+        "title": f"stop {scene_number}",
         "system": "braking",
         "procedures": {"stop": procedure(draw, kind)},
         "road": road(draw),

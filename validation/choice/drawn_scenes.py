@@ -57,8 +57,12 @@ def _pitch_plane(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, .
         effects["gyro"] = {"deviation": 1e-3, "sampling_rate": 100.0}
     start = {"pitch": float(rng.uniform(-0.1, 0.1))} if rng.random() < 0.5 else {}
     step = float(rng.choice([1e-4, 2.5e-4, 5e-4]))
-    asked = rng.choice(["f1", "f2", "f3", "z3", "pitch", "rms f1", "max f2", "rms pitch_rate"], 2, replace=False)
-    return {"run": {"duration": 2.0, "step": step}, "start": start, "effects": effects}, tuple(map(str, asked))
+    drawn_quantities = rng.choice(
+        ["f1", "f2", "f3", "z3", "pitch", "rms f1", "max f2", "rms pitch_rate"], 2, replace=False
+    )
+    return {"run": {"duration": 2.0, "step": step}, "start": start, "effects": effects}, tuple(
+        map(str, drawn_quantities)
+    )
 
 
 def _random_wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -67,7 +71,7 @@ def _random_wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[st
     factors = {name: float(np.exp(rng.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
     usual = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
     displacement = float(10.0 ** rng.uniform(-4.0, -2.2))
-    asked = rng.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
+    drawn_quantities = rng.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
     return {
         "wheelset": {"override": {name: usual[name] * factor for name, factor in factors.items()}},
         "contact": {"law": "fastsim"},
@@ -78,7 +82,7 @@ def _random_wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[st
             "displacement": displacement,
             "speeds": [float(rng.uniform(5.0, 60.0))],
         },
-    }, tuple(map(str, asked))
+    }, tuple(map(str, drawn_quantities))
 
 
 def _random_stop(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -103,8 +107,8 @@ def _random_stop(rng: np.random.Generator) -> tuple[dict[str, Any], tuple[str, .
         table["load_transfer"] = {"front": float(rng.uniform(0.2, 0.4))}
     if rng.random() < 0.7:
         table["pressure"] = {"fill": float(rng.uniform(0.01, 0.2)), "empty": float(rng.uniform(0.01, 0.2))}
-    asked = rng.choice(["stopping distance [m]", "stopping time [s]", "MFDD [m/s^2]", "mean slip"], 1)
-    return table, tuple(map(str, asked))
+    drawn_quantities = rng.choice(["stopping distance [m]", "stopping time [s]", "MFDD [m/s^2]", "mean slip"], 1)
+    return table, tuple(map(str, drawn_quantities))
 
 
 DRAWN_SYSTEMS = {"pitch-plane": _pitch_plane, "wheelset": _random_wheelset, "braking": _random_stop}

@@ -35,10 +35,10 @@ class Bounces:
         }
         self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
 
-    def path(self, start: np.ndarray, count: int) -> np.ndarray:
+    def path(self, start: np.ndarray, state_count: int) -> np.ndarray:
         """States (count + 1, 8) at intervals of ``step`` (s), from the initial state (8,)."""
         states = [np.append(start, 1.0)]
-        for _ in range(count):
+        for _ in range(state_count):
             states.append(self._state_after_step(states[-1]))
         return np.array(states)[:, :8]
 
@@ -46,22 +46,22 @@ class Bounces:
         """The state (9,) a step later."""
         left, states = self.step, self._states(x)
         while True:
-            after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
-            if self._states(after) == states:
-                return after
+            state_after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
+            if self._states(state_after) == states:
+                return state_after
             passed, x = self._switch(x, states, left)
             left, states = left - passed, self._states(x)
 
     def _switch(self, x: np.ndarray, states: Pair, longest: float) -> tuple[float, np.ndarray]:
         """Time (s) at which a tyre changes its contact state, and the vehicle's state at that time."""
-        before, after = 0.0, longest
+        time_before, time_after = 0.0, longest
         for _ in range(SWITCH_BISECTIONS):
-            middle = 0.5 * (before + after)
+            middle = 0.5 * (time_before + time_after)
             if self._states(expm(self.rates[states] * middle) @ x) == states:
-                before = middle
+                time_before = middle
             else:
-                after = middle
-        return after, expm(self.rates[states] * after) @ x
+                time_after = middle
+        return time_after, expm(self.rates[states] * time_after) @ x
 
     def _states(self, x: np.ndarray) -> Pair:
         """Contact state of each tyre."""

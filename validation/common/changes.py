@@ -52,8 +52,8 @@ def _rows_by_id(content: Saved) -> dict[str, Saved]:
 
 def _provenance_tables(content: Saved) -> Saved:
     """Provenance of the rows, as tables."""
-    kept = dict(content["provenance"])
-    return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
+    tables = dict(content["provenance"])
+    return tables | {name: dict(tables.get(name) or {}) for name in ("versions", "seeds")}
 
 
 def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
@@ -65,7 +65,10 @@ def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Sa
     was = earlier_report["provenance"]
     old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
-    notes += [f"{name} {before} -> {now}" for name, before, now in _differing_environment(was, source)]
+    notes += [
+        f"{name} {earlier_text} -> {current_text}"
+        for name, earlier_text, current_text in _differing_environment(was, source)
+    ]
     return {
         "file": earlier_report["file"],
         "commit": str(was.get("commit", "unknown")),
@@ -108,8 +111,8 @@ def _status_rank(status: Any) -> int:
     return STATUSES.index(status) if status in STATUSES else 0
 
 
-def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
-    row = new or old or {}
+def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> Iterator[Change]:
+    row = new_row or old_row or {}
 
     def change(kind: str, old_value: Any, new_value: Any, size: float = 0.0) -> Change:
         return {
@@ -123,41 +126,45 @@ def _changes_of_row(id: str, old: Saved | None, new: Saved | None) -> Iterator[C
             "reason": row["reason"] if kind in ("status", "new") else "",
         }
 
-    if old is None or new is None:
-        yield change("new" if old is None else "gone", old and old["status"], new and new["status"])
+    if old_row is None or new_row is None:
+        yield change("new" if old_row is None else "gone", old_row and old_row["status"], new_row and new_row["status"])
         return
-    if old["status"] != new["status"]:
-        yield change("status", old["status"], new["status"])
+    if old_row["status"] != new_row["status"]:
+        yield change("status", old_row["status"], new_row["status"])
     for name in ("expected", "tolerance"):
-        if _values_differ(old[name], new[name]):
-            yield change("expected", f"{name} {old[name]}", f"{name} {new[name]}")
-    size = _size_of_change(old, new)
+        if _values_differ(old_row[name], new_row[name]):
+            yield change("expected", f"{name} {old_row[name]}", f"{name} {new_row[name]}")
+    size = _size_of_change(old_row, new_row)
     if size > 0.0:
-        yield change("value", old["value"], new["value"], size)
+        yield change("value", old_row["value"], new_row["value"], size)
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _values_differ(old: Any, new: Any) -> bool:
-    if not (_is_number(old) and _is_number(new)):
-        return old != new
-    both_none = old != old and new != new  # neither is a number
-    return not (both_none or old == new or abs(new - old) <= ROUNDING_SHARE * max(abs(old), abs(new)))
+def _values_differ(old_value: Any, new_value: Any) -> bool:
+    if not (_is_number(old_value) and _is_number(new_value)):
+        return old_value != new_value
+    both_none = old_value != old_value and new_value != new_value  # neither is a number
+    return not (
+        both_none
+        or old_value == new_value
+        or abs(new_value - old_value) <= ROUNDING_SHARE * max(abs(old_value), abs(new_value))
+    )
 
 
-def _size_of_change(old: Saved, new: Saved) -> float:
+def _size_of_change(old_row: Saved, new_row: Saved) -> float:
     """Change of a value as a share of its tolerance, or of the value if there is no tolerance; 0 for mere rounding."""
-    was, now, tolerance = old["value"], new["value"], new["tolerance"]
-    if not _values_differ(was, now):
+    was, current_value, tolerance = old_row["value"], new_row["value"], new_row["tolerance"]
+    if not _values_differ(was, current_value):
         return 0.0
-    if not (_is_number(was) and _is_number(now)) or not abs(now - was) < float("inf"):
+    if not (_is_number(was) and _is_number(current_value)) or not abs(current_value - was) < float("inf"):
         return float("inf")
     if tolerance and _is_number(tolerance):
-        share = abs(now - was) / tolerance
-        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE_SHARE else share
-    return abs(now - was) / max(abs(was), abs(now))
+        share = abs(current_value - was) / tolerance
+        return 0.0 if new_row["expected"] == 0 and share < NEGLIGIBLE_SHARE else share
+    return abs(current_value - was) / max(abs(was), abs(current_value))
 
 
 def change_lines(compared: Saved) -> list[str]:
@@ -166,14 +173,14 @@ def change_lines(compared: Saved) -> list[str]:
     names = zip(CHANGE_KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
     counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
     head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
-    told = [
+    lines = [
         f"  {change['kind']}: {change['id']}: {change['quantity']}: "
         f"{_value_text(change['before'])} -> {_value_text(change['after'])}"
         f"{' ' + change['unit'] if change['kind'] == 'value' and change['unit'] else ''}"
         f"{': ' + change['reason'] if change['reason'] else ''}"
         for change in changed
     ]
-    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *told]
+    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *lines]
 
 
 def _value_text(value: Any) -> str:

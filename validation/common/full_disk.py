@@ -36,9 +36,9 @@ def damaged_moments(folder: Path) -> int:
     result = simulate(road_scene(duration=0.05), "reference")
     (folder / "whole").mkdir()
     _save_until_full(result, folder / "whole")
-    whole = file_sizes(folder / "whole")
+    complete_sizes = file_sizes(folder / "whole")
     shares = np.linspace(0.0, 0.99, MOMENTS_TRIED)
-    return sum(_is_damaged(result, folder / f"{i}", share, whole) for i, share in enumerate(shares))
+    return sum(_is_damaged(result, folder / f"{i}", share, complete_sizes) for i, share in enumerate(shares))
 
 
 def file_sizes(folder: Path) -> dict[str, int]:

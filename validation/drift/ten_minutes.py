@@ -29,11 +29,13 @@ def draw(data: Saved) -> Drawn:
     if data["ten minutes"]:
         figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.0), sharey=True)
         paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(RATE_DEVIATION, SAMPLING_RATE))
-        times = np.arange(paths.shape[1])
+        seconds = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):
-            axis.plot(times, paths[:, :, i].T, color=BLUE, linewidth=0.6)
+            axis.plot(seconds, paths[:, :, i].T, color=BLUE, linewidth=0.6)
             for sign in (1, -1):
-                axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
+                axis.plot(
+                    seconds, sign * walk * seconds**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0)
+                )
             axis.set(title=f"about global {'xyz'[i]} [deg]", xlabel="time [s]")
         axes[0].legend(loc="upper left")
         add_heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")

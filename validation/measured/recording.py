@@ -33,11 +33,11 @@ def find() -> Path | None:
 def read(path: Path) -> Recording:
     """Rates and poses on a common clock. Rates are interpolated linearly, poses along the shortest rotation."""
     with np.load(path) as data:
-        times, seen = data["gyro_t"], data["frame_t"]
-        clock = np.arange(max(times[0], seen[0]), min(times[-1], seen[-1]), PERIOD)
+        gyro_times, frame_times = data["gyro_t"], data["frame_t"]
+        clock = np.arange(max(gyro_times[0], frame_times[0]), min(gyro_times[-1], frame_times[-1]), PERIOD)
         free = data["gyro"] - data["gyro_bias"]
-        rates = np.column_stack([np.interp(clock, times, free[:, i]) for i in range(3)])
-        pose = Slerp(seen, Rotation.from_quat(data["frame_q"], scalar_first=True))(clock)
+        rates = np.column_stack([np.interp(clock, gyro_times, free[:, i]) for i in range(3)])
+        pose = Slerp(frame_times, Rotation.from_quat(data["frame_q"], scalar_first=True))(clock)
     return Recording(rates, pose.as_quat(scalar_first=True))
 
 

@@ -71,7 +71,7 @@ def measured_road_rows() -> tuple[list[Row], list[dict[str, Any]]]:
         return [not_run("ride_road.measured", SYSTEM, "measured two-track roads", "TWINRIG_DATA names no folder")], []
     rows, shown = [], []
     for name, (first, last) in ROAD_SECTIONS.items():
-        tracks = read_tracks(data / name, first=first, last_station=last)
+        tracks = read_tracks(data / name, first_station=first, last_station=last)
         fitted = fit_road(tracks)
         if name == "belgian_block.crg":
             rows.append(

@@ -70,8 +70,8 @@ def values_at(priced_run: PricedRun, times: np.ndarray, kink_period: float = 0.0
     if np.abs(row_position - index).max() < ROW_TIME_ROUNDING:
         return priced_run.values[np.minimum(index, last_row)]
     rows = max(3, round(kink_period / step)) if kink_period else last_row
-    first = np.minimum((row_position + ROW_TIME_ROUNDING) // rows * rows, last_row - 3).astype(int)
-    left = np.clip(np.floor(row_position).astype(int) - 1, first, np.minimum(first + rows, last_row) - 3)
+    first_row = np.minimum((row_position + ROW_TIME_ROUNDING) // rows * rows, last_row - 3).astype(int)
+    left = np.clip(np.floor(row_position).astype(int) - 1, first_row, np.minimum(first_row + rows, last_row) - 3)
     s = row_position - left
     weights = (
         -(s - 1) * (s - 2) * (s - 3) / 6,

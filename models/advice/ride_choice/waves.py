@@ -128,9 +128,9 @@ def pair_factors(
     }
 
 
-def _noise_product(first: np.ndarray, second_factor: np.ndarray) -> np.ndarray:
+def _noise_product(first_factor: np.ndarray, second_factor: np.ndarray) -> np.ndarray:
     """Product of (w, q, k) with the conjugate of (w, q, k), summed over the noises k: (w, q)."""
-    return np.einsum("wqk,wqk->wq", first, second_factor.conj())
+    return np.einsum("wqk,wqk->wq", first_factor, second_factor.conj())
 
 
 def variances(

@@ -248,6 +248,6 @@ def sampled_cycle(
             state = go_on(state, 0.0, SAMPLE / substeps, driven)
         if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
-    first, last_start = starts[skip], starts[-1]
-    time, impulse = last_start.time - first.time, last_start.impulse - first.impulse
+    first_start, last_start = starts[skip], starts[-1]
+    time, impulse = last_start.time - first_start.time, last_start.impulse - first_start.impulse
     return Cycle(time / cycles, (), impulse / time / frozen.peak, ())

@@ -99,14 +99,14 @@ class PerWheel:
         if not sample.brake:
             return self._command_all(0.0 if self._pressures else RELEASE)
         commands = [0.0] * self._wheels
-        for k, (first, last_wheel) in enumerate(self._groups):
-            wheel = min(wheels[first], wheels[last_wheel])
+        for k, (first_wheel, last_wheel) in enumerate(self._groups):
+            wheel = min(wheels[first_wheel], wheels[last_wheel])
             speed_before = self._before[k]
             gains = (wheel - speed_before) / self._common.period - slowing if speed_before == speed_before else 0.0
             self._before[k] = wheel
             if speed > 0.0:
                 answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, sample.supply)
-                commands[first] = commands[last_wheel] = answer
+                commands[first_wheel] = commands[last_wheel] = answer
         if speed < self._common.cut_off:
             return self._command_all(sample.supply if self._pressures else APPLY)
         return self._commands_of_logics(commands)

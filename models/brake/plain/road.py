@@ -17,15 +17,18 @@ def under_wheels(road: Road, wheel_paths: np.ndarray, surface_kinds: np.ndarray)
 
 def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
     (behind, front_end), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
-    first, last_stretch = _stretch_at(road, behind), _stretch_at(road, front_end)
-    if last_stretch > first:
+    first_stretch, last_stretch = _stretch_at(road, behind), _stretch_at(road, front_end)
+    if last_stretch > first_stretch:
         on_left = distance[:, 1].mean() >= road.line
-        sides = [int((road.left if on_left else road.right)[k]) for k in (first, last_stretch)]
+        sides = [int((road.left if on_left else road.right)[k]) for k in (first_stretch, last_stretch)]
         share = (front_end - road.starts[last_stretch]) / (front_end - behind)
     elif right < road.line <= left:
-        sides, share = [int(road.right[first]), int(road.left[first])], (left - road.line) / (left - right)
+        sides, share = (
+            [int(road.right[first_stretch]), int(road.left[first_stretch])],
+            (left - road.line) / (left - right),
+        )
     else:
-        sides, share = 2 * [int((road.left if right >= road.line else road.right)[first])], 0.0
+        sides, share = 2 * [int((road.left if right >= road.line else road.right)[first_stretch])], 0.0
     near, far = (side * road.kinds + kind for side in sides)
     return Surface(near, far, float(share) if near != far else 0.0)
 

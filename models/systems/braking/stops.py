@@ -113,15 +113,15 @@ class Welch:
     p_value: float
 
 
-def welch_test(first: Scatter, second_scatter: Scatter) -> Welch:
+def welch_test(first_scatter: Scatter, second_scatter: Scatter) -> Welch:
     """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
     from scipy.stats import t as student
 
-    a, b = first.error**2, second_scatter.error**2
-    gap, error = second_scatter.mean - first.mean, sqrt(a + b)
+    a, b = first_scatter.error**2, second_scatter.error**2
+    gap, error = second_scatter.mean - first_scatter.mean, sqrt(a + b)
     if error == 0.0:
         return Welch(gap, 0.0, 0.0 if gap == 0.0 else np.copysign(np.inf, gap), np.inf, float(gap == 0.0))
-    freedoms = (a + b) ** 2 / (a**2 / (first.count - 1) + b**2 / (second_scatter.count - 1))
+    freedoms = (a + b) ** 2 / (a**2 / (first_scatter.count - 1) + b**2 / (second_scatter.count - 1))
     t = gap / error
     half, p = student.ppf(0.975, freedoms) * error, 2.0 * student.sf(abs(t), freedoms)
     return Welch(gap, float(half), t, freedoms, float(p))

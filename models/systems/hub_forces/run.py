@@ -185,7 +185,9 @@ def errors_of_steps(
     estimates, method_text = by_steps(
         fine._replace(channels=_moving_channels(fine.channels, units)), rerun, order, step
     )
-    return {name: replace(channel_estimate, unit=units[name]) for name, channel_estimate in estimates.items()}, method_text
+    return {
+        name: replace(channel_estimate, unit=units[name]) for name, channel_estimate in estimates.items()
+    }, method_text
 
 
 def principal_series(vehicle: CutVehicle, run: HubRun, start_time: float = 0.0) -> Series:

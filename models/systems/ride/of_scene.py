@@ -138,7 +138,7 @@ def fitted_road(scene: RideScene) -> "FittedRoad":
     road = scene.road
     assert road.file is not None
     path = scene.path(road.file, "road.file")
-    return fit_road(read_tracks(path, road.track_width, first=road.first, last_station=road.last))
+    return fit_road(read_tracks(path, road.track_width, first_station=road.first, last_station=road.last))
 
 
 def half_track_of(scene: RideScene, wheels: tuple[WheelPosition, ...]) -> float:

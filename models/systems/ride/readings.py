@@ -19,7 +19,11 @@ LOWEST_WAVENUMBER_SHARE, HIGHEST_WAVENUMBER = 1e-2, 500.0
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of the tyre that each output of the kind tyre force belongs to."""
     loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    forces = (tyre_output for tyre_output in vehicle.outputs if isinstance(tyre_output, TyreOutput) and tyre_output.kind == "tyre force")
+    forces = (
+        tyre_output
+        for tyre_output in vehicle.outputs
+        if isinstance(tyre_output, TyreOutput) and tyre_output.kind == "tyre force"
+    )
     return {output.name: loads[output.tyre] for output in forces}
 
 

@@ -24,9 +24,11 @@ from validation.measured.measured_files.odd import (
 HEADER = "time [s],Fz [N],Fx [N]"
 
 
-def csv_rows(separator: str = ",", end: str = "\n") -> list[str]:
+def csv_rows(separator: str = ",", line_end: str = "\n") -> list[str]:
     """Rows of the usual file."""
-    return [separator.join(map(repr, row)) + end for row in zip(TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)]
+    return [
+        separator.join(map(repr, row)) + line_end for row in zip(TIMES.tolist(), FZ.tolist(), FX.tolist(), strict=True)
+    ]
 
 
 def text(header: str = HEADER, body: list[str] | None = None, encoding: str = "utf-8") -> Make:
@@ -184,4 +186,4 @@ RIGHT: Files = {
     ),
 }
 GREEDY = ("CSV of one endless line",)
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

@@ -78,20 +78,22 @@ def block(data: bytes, kind: bytes) -> int:
     return next(i for i in range(0, len(data), 8) if data[i : i + 4] == kind)
 
 
-def inside(data: bytes, kind: bytes, offset: int, new: bytes) -> bytes:
+def inside(data: bytes, kind: bytes, offset: int, new_bytes: bytes) -> bytes:
     """Other bytes in a block's data, which stand after its links."""
-    place = block(data, kind)
-    return patched(data, place + DATA + 8 * struct.unpack_from("<Q", data, place + 16)[0] + offset, new)
+    block_start = block(data, kind)
+    return patched(
+        data, block_start + DATA + 8 * struct.unpack_from("<Q", data, block_start + 16)[0] + offset, new_bytes
+    )
 
 
-def changed(kind: bytes, offset: int, new: bytes, make_file: Make = MDF4) -> Make:
+def changed(kind: bytes, offset: int, new_bytes: bytes, make_file: Make = MDF4) -> Make:
     """Make a file with other bytes in a block's data."""
-    return altered(make_file, lambda data: inside(data, kind, offset, new))
+    return altered(make_file, lambda data: inside(data, kind, offset, new_bytes))
 
 
-def linked(kind: bytes, offset: int, number: int) -> Make:
+def linked(kind: bytes, offset: int, new_number: int) -> Make:
     """Make the usual file with another number in the head or a link of a block."""
-    return altered(MDF4, lambda data: patched(data, block(data, kind) + offset, struct.pack("<Q", number)))
+    return altered(MDF4, lambda data: patched(data, block(data, kind) + offset, struct.pack("<Q", new_number)))
 
 
 def looped(kind: bytes) -> Make:
@@ -99,19 +101,19 @@ def looped(kind: bytes) -> Make:
     return altered(MDF4, lambda data: patched(data, block(data, kind) + DATA, struct.pack("<Q", block(data, kind))))
 
 
-def clocked(offset: int, new: bytes) -> Make:
+def clocked(offset: int, new_bytes: bytes) -> Make:
     """Make the usual file whose master channel is another one; its block has its kind, 2, after eight links."""
 
     def change(data: bytes) -> bytes:
         master = next(i for i in range(0, len(data), 8) if data[i : i + 4] == b"##CN" and data[i + 88] == 2)
-        return patched(data, master + 88 + offset, new)
+        return patched(data, master + 88 + offset, new_bytes)
 
     return altered(MDF4, change)
 
 
-def headed(byte_offset: int, new: bytes, length: int | None = None) -> Make:
+def headed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Make:
     """Make the usual file, or its first bytes, with others at its beginning."""
-    return altered(MDF4, lambda data: patched(data, byte_offset, new)[:length])
+    return altered(MDF4, lambda data: patched(data, byte_offset, new_bytes)[:length])
 
 
 def only(name: str, values: np.ndarray, times: np.ndarray = TIMES) -> Truth:
@@ -247,7 +249,7 @@ GREEDY = (
     "MDF 4 that claims to be a terabyte when unpacked",
 )
 FILES = (
-    *every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY),
+    *every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY),
     *(
         OddFile(
             f"MDF {version[0]} whose groups are wheels",

@@ -69,7 +69,7 @@ class OddFile:
         changed, or reading took too much time or memory."""
         folder.mkdir(parents=True, exist_ok=True)
         path = self.make(folder)
-        before = _state(folder)
+        state_before = _state(folder)
         try:
             return self._measured(path)
         except InputError as refusal:
@@ -77,7 +77,7 @@ class OddFile:
                 raise AssertionError(f"{self.name}: {refusal} does not say {self.says!r}") from refusal
             raise
         finally:
-            if _state(folder) != before:
+            if _state(folder) != state_before:
                 raise AssertionError(f"{self.name}: something was written beside {path} or into it")
 
     def _measured(self, path: Path) -> float:
@@ -96,19 +96,22 @@ class OddFile:
 
 
 def every(
-    refused: Files | None = None, named: Files | None = None, right: Files | None = None, greedy: Sequence[str] = ()
+    refused: Files | None = None,
+    named_files: Files | None = None,
+    right_files: Files | None = None,
+    greedy: Sequence[str] = (),
 ) -> tuple[OddFile, ...]:
     """All files of these three tables; greedy : names of files that claim a huge size, for which no memory may be
     allocated."""
     tables: tuple[tuple[Wanted, Files], ...] = (
         ("refused", refused or {}),
-        ("named", named or {}),
-        ("right", right or {}),
+        ("named", named_files or {}),
+        ("right", right_files or {}),
     )
     odds = list[OddFile]()
     for wanted, files in tables:
-        for name, (hard, make, *rest) in files.items():
-            says, *truth = rest if wanted != "right" else ("", *rest)
+        for name, (hard, make, *expectation) in files.items():
+            says, *truth = expectation if wanted != "right" else ("", *expectation)
             odds.append(OddFile(name, hard, make, wanted, says, truth[0] if truth else usual(), name in greedy))
     return tuple(odds)
 
@@ -125,18 +128,25 @@ def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         names = [channel.name for channel in source.channels if channel.group == group]
         count = next(channel.count for channel in source.channels if channel.group == group)
         blocks = list(source.blocks(names, 1 + count // (6 if len(names) < 100 else 1)))
-        times, values = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("times", "values"))
-        channels |= {name: (times, values[:, i]) for i, name in enumerate(names)}
+        sample_times, values = (
+            np.concatenate([getattr(block, key) for block in blocks]) for key in ("times", "values")
+        )
+        channels |= {name: (sample_times, values[:, i]) for i, name in enumerate(names)}
     return channels
 
 
-def difference(source: Source, truth: Truth, says: str) -> float:
+def difference(source: Source, truth: Truth, expected_text: str) -> float:
     """Largest difference between a file and the expected values; infinite if a channel, a sample or the reader's
     message is missing."""
-    channels, said = read(source), [finding.text for finding in source.noticed if finding.weight != "note" or says]
-    if set(channels) != set(truth) or not (any(says in text for text in said) if says else not said):
+    channels, finding_texts = (
+        read(source),
+        [finding.text for finding in source.noticed if finding.weight != "note" or expected_text],
+    )
+    if set(channels) != set(truth) or not (
+        any(expected_text in text for text in finding_texts) if expected_text else not finding_texts
+    ):
         return np.inf
-    return max(_largest_difference(channels[name], truth[name], bool(says)) for name in truth)
+    return max(_largest_difference(channels[name], truth[name], bool(expected_text)) for name in truth)
 
 
 def _largest_difference(
@@ -146,10 +156,12 @@ def _largest_difference(
     count = len(read_channel[0])
     if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not partial_allowed):
         return np.inf
-    times, values = truth[0][:count], truth[1][:count]
+    true_times, values = truth[0][:count], truth[1][:count]
     if not np.array_equal(np.isnan(read_channel[1]), np.isnan(values)):
         return np.inf
-    return float(max(np.abs(read_channel[0] - times).max(), np.nanmax(np.abs(read_channel[1] - values), initial=0.0)))
+    return float(
+        max(np.abs(read_channel[0] - true_times).max(), np.nanmax(np.abs(read_channel[1] - values), initial=0.0))
+    )
 
 
 def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
@@ -191,9 +203,9 @@ def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -
     return altered_file
 
 
-def patched(data: bytes, byte_offset: int, new: bytes) -> bytes:
-    """Bytes of a file, in which ``new`` replaces those from an offset on."""
-    return data[:byte_offset] + new + data[byte_offset + len(new) :]
+def patched(data: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
+    """Bytes of a file, in which ``new_bytes`` replaces those from an offset on."""
+    return data[:byte_offset] + new_bytes + data[byte_offset + len(new_bytes) :]
 
 
 def two_rates(extension: str) -> Make:
@@ -233,15 +245,19 @@ class CutSweep:
         path = written(folder / f"cut{self.extension}", values=table)
         truth = {name: (PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)}
         data = path.read_bytes()
-        places = range(len(data)) if self.cuts == 0 else np.linspace(0, len(data) - 1, self.cuts).astype(int).tolist()
-        return sum(self._is_silent(path, data[:place], truth) for place in places)
+        cut_lengths = (
+            range(len(data)) if self.cuts == 0 else np.linspace(0, len(data) - 1, self.cuts).astype(int).tolist()
+        )
+        return sum(self._is_silent(path, data[:cut_length], truth) for cut_length in cut_lengths)
 
     def _is_silent(self, path: Path, data: bytes, truth: Truth) -> bool:
         """Whether one cut is not noticed by the reader."""
         path.write_bytes(data)
         try:
             source = open_source(path)
-            kept = {name: truth[name] for name in truth if name in {channel.name for channel in source.channels}}
-            return difference(source, kept, "cut off") > TOLERANCE
+            complete_truth = {
+                name: truth[name] for name in truth if name in {channel.name for channel in source.channels}
+            }
+            return difference(source, complete_truth, "cut off") > TOLERANCE
         except InputError as refusal:
             return path.name not in str(refusal)

@@ -35,9 +35,9 @@ def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
         size = BLOCK * int(values["NUM_HEADER_BLOCKS"])
         names = {name.replace(".", "_"): name for name in values}
         values |= {names.get(key, key): value for key, value in changed.items()}
-        kept = {name: value for name, value in values.items() if value is not None}
-        kept["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(kept))
-        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in kept.items()]
+        given_parameters = {name: value for name, value in values.items() if value is not None}
+        given_parameters["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(given_parameters))
+        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()]
         return b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0") + data[size:]
 
     return altered(make_file, change)
@@ -47,7 +47,10 @@ def _values(data: bytes) -> dict[str, Any]:
     """Header parameters of a file, by name."""
     count = int(data[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
     records = [data[i * RECORD : (i + 1) * RECORD] for i in range(count)]
-    texts = [[part.rstrip(b"\0").decode("latin-1") for part in (record[:KEY], record[KEY:])] for record in records]
+    texts = [
+        [header_part.rstrip(b"\0").decode("latin-1") for header_part in (record[:KEY], record[KEY:])]
+        for record in records
+    ]
     return dict(texts)
 
 
@@ -62,10 +65,10 @@ def sample(value: float) -> Make:
     return altered(RPC, lambda data: patched(data, len(data) - 2 * POINTS * 4 + 5 * 4, new))
 
 
-def padded(count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Expected values, with the last one repeated up to ``count`` samples."""
-    times, more = PERIOD * np.arange(count), (0, count - COUNT)
-    return {name: (times, np.pad(values, more, mode="edge")) for name, (_, values) in usual().items()}
+def padded(sample_count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Expected values, with the last one repeated up to ``sample_count`` samples."""
+    sample_times, padding = PERIOD * np.arange(sample_count), (0, sample_count - COUNT)
+    return {name: (sample_times, np.pad(values, padding, mode="edge")) for name, (_, values) in usual().items()}
 
 
 WHOLE_NUMBERS = {"Fz": (TIMES, 2.0**-6 * np.arange(COUNT)), "Fx": (TIMES, FX)}
@@ -187,4 +190,4 @@ RIGHT: Files = {
     ),
 }
 GREEDY = ("RPC III of a huge number of frames", "RPC III of a huge number of channels", "RPC III of a huge header")
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)

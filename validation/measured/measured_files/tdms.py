@@ -52,32 +52,32 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
     return make
 
 
-def changed(offset: int, new: bytes, length: int | None = None) -> Make:
+def changed(offset: int, new_bytes: bytes, length: int | None = None) -> Make:
     """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
 
     def change(data: bytes) -> bytes:
         begin = data.rindex(b"TDSm")
-        return patched(data, begin + offset, new)[: None if length is None else begin + length]
+        return patched(data, begin + offset, new_bytes)[: None if length is None else begin + length]
 
     return altered(TDMS, change)
 
 
-def cut_by(count: int) -> Make:
+def cut_by(byte_count: int) -> Make:
     """Make the usual file without its last bytes."""
-    return altered(TDMS, lambda data: data[:-count])
+    return altered(TDMS, lambda data: data[:-byte_count])
 
 
-def claims(new: int) -> Make:
+def claims(stated_count: int) -> Make:
     """Make the usual file with a wrong number of samples stated for the first channel."""
-    index, number = struct.pack("<LLLQ", 20, 10, 1, COUNT), struct.pack("<Q", new)
+    index, number = struct.pack("<LLLQ", 20, 10, 1, COUNT), struct.pack("<Q", stated_count)
     return altered(TDMS, lambda data: patched(data, data.rindex(index) + 12, number))
 
 
 def beside_old_index(folder: Path) -> Path:
     """Write the usual TDMS file beside an index file that belongs to another file."""
-    other = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
-    data = other.read_bytes()
-    other.unlink()
+    other_path = written(folder / "other.tdms", ("a", "b", "c"), np.ones((5, 3)))
+    data = other_path.read_bytes()
+    other_path.unlink()
     (folder / "odd.tdms_index").write_bytes(data.replace(b"TDSm", b"TDSh"))
     return TDMS(folder)
 
@@ -238,4 +238,4 @@ GREEDY = (
     "TDMS of a huge number of channels",
     "TDMS of a huge name",
 )
-FILES = every(refused=REFUSED, named=NAMED, right=RIGHT, greedy=GREEDY)
+FILES = every(refused=REFUSED, named_files=NAMED, right_files=RIGHT, greedy=GREEDY)
