@@ -135,11 +135,13 @@ class _Reading:
             raise statement.refuse("", marker_number, "is no marker of the file")
         return self.markers[marker_number]
 
-    def pair(self, statement: Statement, first: int, second_number: int) -> tuple[Marker, Marker]:
+    def pair(self, statement: Statement, first_number: int, second_number: int) -> tuple[Marker, Marker]:
         """Of two markers, the one on the ground and the one on the body, in this order."""
-        marker_pair = self.marker(statement, first), self.marker(statement, second_number)
+        marker_pair = self.marker(statement, first_number), self.marker(statement, second_number)
         if {marker.part for marker in marker_pair} != {self.ground.number, self.part.number}:
-            raise statement.refuse("", [first, second_number], "must be a marker of the ground and one of the body")
+            raise statement.refuse(
+                "", [first_number, second_number], "must be a marker of the ground and one of the body"
+            )
         return marker_pair if marker_pair[0].part == self.ground.number else marker_pair[::-1]
 
     def mechanism(self) -> Mechanism:

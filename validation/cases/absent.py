@@ -112,11 +112,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     those of the vehicle in turn and of other systems every third, and one process that looks for what is imported.
     """
     with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        write_files(place)
-        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, place))]
+        files_folder = Path(name)
+        write_files(files_folder)
+        rows = [*_imports(), *(row for engine in ENGINES for row in _absence(engine, files_folder))]
         rows += [
-            _control(effect, place, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
+            _control(effect, files_folder, ENGINES[i % len(ENGINES) :][:1] if quick else ENGINES)
             for i, effect in enumerate(EFFECTS)
         ]
     return rows + ride.rows(quick) + wheelset.rows() + machinery.rows() + of_systems.rows(quick), {}

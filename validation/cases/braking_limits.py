@@ -43,13 +43,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ends = [ending_text(number) for number in range(STOPS[quick])]
     rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
-    return rows + [_refused_row(*each) for each in REFUSED.items()], {"ends": ends}
+    return rows + [_refused_row(*refusal_arguments) for refusal_arguments in REFUSED.items()], {"ends": ends}
 
 
-def ending_text(number: int) -> str:
+def ending_text(scene_number: int) -> str:
     """Text on how a random stop ended; "" if the vehicle came to rest."""
     try:
-        path = run(build(random_stop(SEED, number))).detail
+        path = run(build(random_stop(SEED, scene_number))).detail
     except RunFailed as error:
         return error.reason
     return "" if path.ended_at_rest else "does not stand"
@@ -97,14 +97,14 @@ def _jackknife_row() -> Row:
             trailer=CHOSEN_TRAILER.model_copy(update={"fold": 1.0}).model_dump(),
         )
     )
-    kept = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
-    angle = 0.0 if kept is None else float(np.abs(np.diff(kept, axis=1)).max())
-    told = "" if end is None or "jackknifes" not in end.reason else end.reason
+    headings = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
+    angle = 0.0 if headings is None else float(np.abs(np.diff(headings, axis=1)).max())
+    angle_text = "" if end is None or "jackknifes" not in end.reason else end.reason
     return Observed(
         "braking_limits.jackknife",
         SYSTEM,
-        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {told}",
-        angle if told else math.nan,
+        f"largest recorded hinge angle of a train that jackknifes, limit 1 rad: {angle_text}",
+        angle if angle_text else math.nan,
         "rad",
     ).within(1.0, 0.02, "a sample before the limit", "closed form")
 
@@ -215,9 +215,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
 """What is beyond physics, and must be refused before it runs."""
 
 
-def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
+def _refused_row(name: str, ask_refused: Callable[[], Any]) -> Row:
     try:
-        ask()
+        ask_refused()
         outcome = "taken"
     except InputError as error:
         outcome = "refused" if error.place and error.value is not None else "refused without its value"

@@ -65,10 +65,10 @@ WATCHED_SECONDS = 2.0
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the four headline cases, two steps, two surfaces."""
     steps = tuple(step for step in STEPS[quick] if step >= FINE_STEP)
-    curves = {name: _curve(*each, steps) for name, each in HEADLINE.items()}
+    curves = {name: _curve(*headline_arguments, steps) for name, headline_arguments in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *each) for name, each in FURTHER.items()]
+        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER.items()]
     rows += [
         _sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
@@ -88,15 +88,21 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
     tyre, _ = both = friction_table(name)
     force, torque = steady_torque(FRONT_WHEEL, tyre, slip)
     true = exact_distance(FRONT_WHEEL, tyre, torque, speed)
-    ways = {"ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]}
-    ways |= {key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
+    distances = {
+        "ours": [(constant_torque_stop(FRONT_WHEEL, both, torque, speed, step).distance, 0.0) for step in steps]
+    }
+    distances |= {
+        key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES
+    }
     steadily = constant_torque_stop(
         FRONT_WHEEL, both, torque, speed, turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
     ).distance
     return {
         "exact": true,
         "steady": steadily / (FRONT_WHEEL.mass * speed**2 / (2.0 * force)) - 1.0,
-        "errors": {key: [(way / true - 1.0, left) for way, left in ends] for key, ends in ways.items()},
+        "errors": {
+            key: [(scheme_name / true - 1.0, left) for scheme_name, left in ends] for key, ends in distances.items()
+        },
         "at": steps.index(PAPER_STEP),
     }
 
@@ -123,14 +129,14 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
     for scheme, (error, left) in errors.items():
-        said = (
+        note = (
             f", and still rolls at {left:.2g} m/s in {LONGEST_TIME_RATIO:g} times the time of stopping" if left else ""
         )
         rows.append(
             Observed(
                 f"{key}.{scheme.split()[-1].lower()}",
                 SYSTEM,
-                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{said}",
+                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{note}",
                 100.0 * error,
                 "%",
             ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
@@ -162,7 +168,7 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {
-        "no number": not all(np.isfinite(part).all() for part in path),
+        "no number": not all(np.isfinite(path_field).all() for path_field in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
         "does not stop": brakes and stopped.step_of_rest < 0,
@@ -207,8 +213,8 @@ def _locked_row() -> Row:
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
         torque = 2.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius * float(tyre[0].mu_x.max())
-        way = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, turning=0.0).distance
-        errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
+        distance = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, turning=0.0).distance
+        errors.append(abs(distance * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
     return Observed(
         "braking_stop.locked",
         SYSTEM,
@@ -241,7 +247,7 @@ def _release_row() -> Row:
 
 def _friction_row(levels: int) -> Row:
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
-    ways = [
+    distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
         for scale in np.geomspace(0.3, 8.0, levels)
     ]
@@ -249,7 +255,7 @@ def _friction_row(levels: int) -> Row:
         "braking_stop.friction",
         SYSTEM,
         f"levels of friction, of {levels}, at which a higher level does not shorten the stop, brakes beyond lock",
-        sum(b >= a for a, b in pairwise(ways)),
+        sum(b >= a for a, b in pairwise(distances)),
         "",
     ).within(0, 0, "asked for", "none")
 

@@ -92,44 +92,46 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     setups = every()
-    told = [each for each in setups if each.told]
-    rows += _price_rows(Prices([*told, *(each.without for each in told)], ROUNDS))
+    listed_setups = [setup for setup in setups if setup.told]
+    rows += _price_rows(Prices([*listed_setups, *(setup.without for setup in listed_setups)], ROUNDS))
     shown = Prices(setups, FIGURE_ROUNDS)
-    return rows, {**data, "points": [shown.point(each) for each in setups]}
+    return rows, {**data, "points": [shown.point(setup) for setup in setups]}
 
 
 def every() -> list[Setup]:
     """All set-ups."""
     setups = []
     for engine, (usual, fine) in ENGINES.items():
-        best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
+        best, *other_bridges = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
         for method, count in (*((usual, count) for count in COUNTS), (fine, 4)):
             setups += [Setup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
             setups += [Setup(engine, method, best, law, count) for law in (LAWS if method == usual else (MAIN,))]
-        setups += [Setup(engine, method, other, MAIN, 4) for method in (usual, fine) for other in others]
+        setups += [
+            Setup(engine, method, other_bridge, MAIN, 4) for method in (usual, fine) for other_bridge in other_bridges
+        ]
     return [*setups, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
 
 
 class Prices:
     """Measured times (s) of every round: per step for each set-up, and per evaluation of the forces on all wheels."""
 
-    def __init__(self, setups: list[Setup], rounds: int) -> None:
+    def __init__(self, setups: list[Setup], round_count: int) -> None:
         self.setups = setups
-        kernels = sorted({(each.law, each.count) for each in setups if each.law is not None})
-        runs, loops = [_job(each) for each in setups], [_kernel_job(law, count) for law, count in kernels]
+        kernels = sorted({(setup.law, setup.count) for setup in setups if setup.law is not None})
+        runs, loops = [_job(setup) for setup in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
-        seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, SHORTEST_TURN, clock=time.process_time)
-        whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
+        seconds = interleave([*jobs, *(job for job, _ in loops)], round_count, SHORTEST_TURN, clock=time.process_time)
+        full_time, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
         self._steps = {
-            each: (a, b, steps - 1) for each, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)
+            setup: (a, b, steps - 1) for setup, a, b, (_, steps) in zip(setups, full_time, first, runs, strict=True)
         }
-        self._calls = {kernel: each / calls for kernel, each, (_, calls) in zip(kernels, alone, loops, strict=True)}
+        self._calls = {kernel: setup / calls for kernel, setup, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
     def rounds(self, setup: Setup) -> tuple[Any, Any, Any]:
         """Times (s) of each round: of a step, of a step without contact (the engine's share), and of the contact kernel
         in a step."""
         step, bare = (
-            (whole - first) / steps for whole, first, steps in (self._steps[setup], self._steps[setup.without])
+            (full_time - first) / steps for full_time, first, steps in (self._steps[setup], self._steps[setup.without])
         )
         calls = 1 if setup.bridge == "before each step" else EVALUATIONS[setup.method]
         return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.count]
@@ -137,7 +139,7 @@ class Prices:
     def point(self, setup: Setup) -> dict[str, Any]:
         """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of it."""
         a, b, c = self.rounds(setup)
-        step, bare, kernel = (float(np.median(part)) for part in (a, b, c))
+        step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
         share = median((a - b - c) / a)
         return {
             "engine": setup.engine,
@@ -155,17 +157,17 @@ class Prices:
         }
 
 
-def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], int]:
-    wheels = Setup("", "", "native", law, count).wheels()
+def _kernel_job(law: tuple[str, int], wheel_count: int) -> tuple[Callable[[], Any], int]:
+    wheels = Setup("", "", "native", law, wheel_count).wheels()
     q, v = wheels.state()
     f, numbers, calls = np.zeros(wheels.size), wheels.numbers, 4 if law[0] == "simplified" else 200
     return lambda: _repeat(numbers, q, v, f, calls), calls
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat(numbers, q, v, f, times):
-    for _ in range(times):
-        forces(start(numbers), 0.0, start(q), start(v), start(f))
+def _repeat(table_of_wheels, q, v, force_sum, repeats):
+    for _ in range(repeats):
+        forces(start(table_of_wheels), 0.0, start(q), start(v), start(force_sum))
 
 
 def _job(setup: Setup) -> tuple[Callable[[int], Any], int]:
@@ -213,12 +215,12 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     """A contact law that calls the Python functions of the library: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
-    def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
+    def add(table_of_wheels: Array, q: Array, v: Array, force_sum: Array) -> None:
         pressed: Any
         creep: Any
-        for k, (place, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
-            approach, mu, speed = wheels.sunk + place["z"], wheels.mu, wheels.speed
-            slip = rate["x"] / speed, rate["y"] / speed - place["yaw"], rate["yaw"] / speed
+        for k, (position, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
+            approach, mu, speed = wheels.sunk + position["z"], wheels.mu, wheels.speed
+            slip = rate["x"] / speed, rate["y"] / speed - position["yaw"], rate["yaw"] / speed
             if bodies is not None:
                 pressed = press(bodies, wheels.pair, approach=approach)
                 creep = roll(pressed, mu, *slip, cells=wheels.cells)
@@ -226,7 +228,7 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
                 pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
                 ellipse = RollingEllipse(pressed.a, pressed.b, pressed.load, mu, *slip)
                 creep = fastsim(ellipse, wheels.pair, cells=wheels.cells)
-            f[FREEDOMS * k : FREEDOMS * (k + 1)] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
+            force_sum[FREEDOMS * k : FREEDOMS * (k + 1)] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
 
     return add
 
@@ -275,7 +277,7 @@ def _agreement_row() -> Row:
     q, v = wheels.state()
     with installed(kernel_law(forces)):
         path = Marcher(model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
-    other = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
+    by_engine = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
     return Observed(
@@ -283,7 +285,7 @@ def _agreement_row() -> Row:
         SYSTEM,
         "difference of the state after 0.1 s with FASTSIM in MuJoCo from that in Exudyn, over the "
         "largest displacement or rate",
-        float((np.abs(path[-1] - other) / scale).max()),
+        float((np.abs(path[-1] - by_engine) / scale).max()),
         "",
     ).at_most(1e-10, "the same kernel and method; what differs is rounding", "shared kernel")
 
@@ -309,7 +311,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             p["bridge"],
             p["law"],
             "{:.2f} ({:.2f} to {:.2f})".format(*(1e6 * value for value in (p["step"], *p["range"]))),
-            *(f"{1e6 * p[part]:.2f}" for part in ("own", "kernel", "over")),
+            *(f"{1e6 * p[part_name]:.2f}" for part_name in ("own", "kernel", "over")),
             "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])),
         )
         for p in data["points"]

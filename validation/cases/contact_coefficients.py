@@ -163,10 +163,10 @@ def _between_rows(interpolated: Array, nodes: Array) -> list[Row]:
             f"contact_coefficients.between.{span}.{name}",
             SYSTEM,
             f"largest error of the interpolation of {name} half-way between tabulated {span}",
-            float(off[part, i].max()),
+            float(off[span_columns, i].max()),
             "",
         ).at_most(0.01, why, "native")
-        for span, part in spans.items()
+        for span, span_columns in spans.items()
         for i, name in enumerate(NAMES)
     ]
 
@@ -187,13 +187,13 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     ]
     return [
         Observed(
-            f"contact_coefficients.{place}",
+            f"contact_coefficients.{region}",
             SYSTEM,
             f"largest difference of {what} from the exact theory",
             float(values.max()),
             "",
         ).at_most(bound, why, "native")
-        for place, what, values, bound, why in parts
+        for region, what, values, bound, why in parts
     ]
 
 
@@ -207,7 +207,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
     nodes = np.array(data["nodes"])
     some = nodes[nodes[:, 1] == 0.25]
     rows = tuple(
-        (f"{node[0]:.4g}", *(f"{value:.4g} ({100 * part:+.2f} %)" for value, part in zip(node[2:], parts, strict=True)))
+        (
+            f"{node[0]:.4g}",
+            *(f"{value:.4g} ({100 * part_name:+.2f} %)" for value, part_name in zip(node[2:], parts, strict=True)),
+        )
         for node, parts in zip(some, deviation(some), strict=True)
     )
     note = (
@@ -224,7 +227,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
-    solved = np.array([row for part in data.values() for row in part])
+    solved = np.array([row for part_name in data.values() for row in part_name])
     quarter = solved[np.abs(solved[:, 1] - 0.25) < 0.04]
     for i, (name, curve) in enumerate(zip(NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)

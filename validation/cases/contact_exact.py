@@ -60,8 +60,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + sample_rows, {"refined": refined, "sample": sample, "strip": _strip(40, 0.5)[:2]}
 
 
-def _row(name: str, words: str, value: float, bound: float, why: str, unit: str = "", side: Any = "closed form") -> Row:
-    return Observed(f"contact_exact.{name}", SYSTEM, words, value, unit).at_most(bound, why, side)
+def _row(
+    name: str, words: str, value: float, bound: float, tolerance_reason: str, unit: str = "", side: Any = "closed form"
+) -> Row:
+    return Observed(f"contact_exact.{name}", SYSTEM, words, value, unit).at_most(bound, tolerance_reason, side)
 
 
 def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
@@ -112,9 +114,9 @@ def carter(x: Array, a: float, share: float) -> Array:
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
     zone that sticks, a (1 - share) wide each way, at the leading edge.
     """
-    whole = np.sqrt(np.maximum(1 - (x / a) ** 2, 0.0))
+    full_traction = np.sqrt(np.maximum(1 - (x / a) ** 2, 0.0))
     half = a * (1 - share)
-    return whole - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
+    return full_traction - half / a * np.sqrt(np.maximum(1 - ((x - (a - half)) / half) ** 2, 0.0))
 
 
 def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
@@ -149,8 +151,8 @@ def shift(share: float, nu: float, cells: int) -> RollingSolution:
     Cattaneo and Mindlin."""
     body = Material(E=2.1e11, nu=nu)
     pair = MaterialPair(body, body)
-    way = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
-    return solve_shift(hertzian(SIZE, SIZE, LOAD, cells), MU, way, 0.0, pair)
+    shift_distance = 3 * LIMIT * (2 - nu) / (8 * SIZE * pair.G) * (1 - (1 - share) ** (2 / 3))
+    return solve_shift(hertzian(SIZE, SIZE, LOAD, cells), MU, shift_distance, 0.0, pair)
 
 
 def _shift_rows() -> list[Row]:
@@ -257,7 +259,7 @@ def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
     to 120 cells."""
     ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
     body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
-    x, y, spin = (float(part) for part in rng.normal(size=3))
+    x, y, spin = (float(component) for component in rng.normal(size=3))
     case = ContactCase(
         SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, MaterialPair(body, body), "drawn", (x, y, spin), level
     )
@@ -292,7 +294,7 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
     solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
-    force, moment = (max(part[i] for part in solved) for i in (2, 3))
+    force, moment = (max(solved_row[i] for solved_row in solved) for i in (2, 3))
     return solved, [
         _row("sample", words, force, 0.01, "its own error and ours", side="native"),
         _row(

@@ -70,9 +70,9 @@ def ellipse(ratio: float) -> dict[str, Decimal]:
         }
 
 
-def _complete(g: Decimal) -> tuple[Decimal, Decimal]:
+def _complete(axis_ratio: Decimal) -> tuple[Decimal, Decimal]:
     """K and E at the modulus sqrt(1 - g^2): K = pi / (2 M(1, g)), E = K (1 - sum 2^(n-1) c_n^2)."""
-    a, b, total, weight = Decimal(1), g, (1 - g * g) / 2, Decimal(1) / 2
+    a, b, total, weight = Decimal(1), axis_ratio, (1 - axis_ratio * axis_ratio) / 2, Decimal(1) / 2
     while abs(a - b) > Decimal(10) ** (4 - DIGITS) * a:
         weight, c = 2 * weight, (a - b) / 2
         a, b = (a + b) / 2, (a * b).sqrt()
@@ -94,7 +94,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     approach, with the long axis along x and along y."""
     truth = [ellipse(g) for g in ratios]
     flat, steep, load, approach = (
-        np.array([float(each[name]) for each in truth]) for name in ("flat", "steep", "load", "approach")
+        np.array([float(computed[name]) for computed in truth]) for name in ("flat", "steep", "load", "approach")
     )
     touching = [
         by_load(flat, steep, load, PAIR),
@@ -105,7 +105,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
         name: [
-            max(float(abs(Decimal(float(getattr(each, field)[i])) / exact[name] - 1)) for each in touching)
+            max(float(abs(Decimal(float(getattr(computed, field)[i])) / exact[name] - 1)) for computed in touching)
             for i, exact in enumerate(truth)
         ]
         for field, name in named.items()
@@ -149,7 +149,17 @@ def _published() -> list[Row]:
 def _behaviour() -> list[Row]:
     """Rows: zero and negative loads give zero, and input that is no Hertzian contact is refused."""
     nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
-    exact = all(value == 0.0 for each in nothing for value in (each.a, each.b, each.p0, each.approach, each.load))
+    exact = all(
+        value == 0.0
+        for nothing_solved in nothing
+        for value in (
+            nothing_solved.a,
+            nothing_solved.b,
+            nothing_solved.p0,
+            nothing_solved.approach,
+            nothing_solved.load,
+        )
+    )
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
         "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR),
@@ -185,9 +195,9 @@ def _behaviour() -> list[Row]:
     ]
 
 
-def _outcome(ask: Callable[[], object]) -> str:
+def _outcome(ask_refused: Callable[[], object]) -> str:
     try:
-        ask()
+        ask_refused()
     except InputError:
         return "refused"
     return "accepted"

@@ -91,7 +91,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
     against = np.array([case.parts[1] * case.parts[2] < 0 for case in unseen])
     for name in ["blended intermediate"] if quick else [*FASTSIM_BANDS, "simplified"]:
         drawn = theory_errors(name, unseen)
-        for some, place, which, most in (
+        for some, row_name, which, most in (
             (theory_errors(name, cases), "", "of the set", MISSED_SHARE),
             (drawn, "drawn.", "drawn", 1 - HELD_SHARE),
             (drawn.of(against), "against.", "drawn with lateral creepage against spin", MISSED_SHARE),
@@ -101,7 +101,7 @@ def _band_rows(cases: list[ContactCase], quick: bool) -> list[Row]:
             ):
                 rows.append(
                     Observed(
-                        f"contact_price.{place}{kind}.{name.replace(' ', '-')}",
+                        f"contact_price.{row_name}{kind}.{name.replace(' ', '-')}",
                         SYSTEM,
                         f"{name}: share "
                         f"of {some.error.size} contacts {which} beyond the band of error that is stated "
@@ -138,22 +138,22 @@ def _total_rows(cases: list[ContactCase]) -> list[Row]:
     ]
 
 
-def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list[ContactCase]) -> list[Row]:
+def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide_cases: list[ContactCase]) -> list[Row]:
     """Rows: error of FASTSIM_BANDS's moment relative to the exact theory."""
     rows = []
-    range_of_set = [case for case in wide if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
+    range_of_set = [case for case in wide_cases if AXIS_RATIOS[0] <= case.a / case.b <= AXIS_RATIOS[-1]]
     sets = {
         "set": (cases, "the set"),
         "drawn": (unseen, "the drawn contacts"),
         "less_wide": (range_of_set, "the wide contacts of a/b 0.2 to 5, Poisson's ratio 0 to 0.5"),
-        "wide": (wide, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
+        "wide": (wide_cases, "the wide contacts, a/b 0.1 to 10, Poisson's ratio 0 to 0.5"),
     }
-    for (bound, (mean, most)), (place, (some, words)) in product(MOMENTS.items(), sets.items()):
+    for (bound, (mean, most)), (row_name, (some, words)) in product(MOMENTS.items(), sets.items()):
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
         error = theory_errors(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
             observed = Observed(
-                f"contact_price.mz.{bound}.{place}.{what.split()[0]}",
+                f"contact_price.mz.{bound}.{row_name}.{what.split()[0]}",
                 SYSTEM,
                 f"{bound} bound, moment of {len(some)} contacts: {words}; {what} of the error",
                 float(value),
@@ -161,7 +161,7 @@ def _moment_rows(cases: list[ContactCase], unseen: list[ContactCase], wide: list
             )
             rows.append(
                 observed.aim(allowed, SLENDER)
-                if (bound, place) == ("elliptic", "wide")
+                if (bound, row_name) == ("elliptic", "wide")
                 else observed.at_most(allowed, "the exact theory, kept", "native")
             )
     return rows
@@ -201,8 +201,8 @@ def _shares_beyond_stated(cases: list[ContactCase], cells: int, choices: dict[st
     return [float(value) for value in np.mean(answers, axis=0)]
 
 
-def _program_rows(answers: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(values) for name, values in answers["seconds"].items()}
+def _program_rows(program_answers: dict[str, Any]) -> list[Row]:
+    t = {name: np.array(values) for name, values in program_answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "ratio of the time of contact and forces by the program of 1983 to that of the program of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])

@@ -109,29 +109,32 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
 def _against_exact(shape: Shape) -> dict[str, Any]:
     """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
     forces are in % of mu N."""
-    contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
+    contacts = {
+        name: press(shape.distance, PAIR, load=shape.load, options=fitting_options)
+        for name, fitting_options in WAYS.items()
+    }
     normal = exact_normal(shape, EXACT_CELLS, shape.box or _box_around(contacts["elliptic"]))
     motions = creepages(normal.area, shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
     figures = {"approach": normal.approach, "area": normal.area, "peak": float(normal.pressure.max())}
-    ways = {}
+    errors_by_fitting = {}
     for name, contact in contacts.items():
         forces = [
             float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * shape.load))
             for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
-        ways[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
-    return {"exact": figures, "ways": ways, "rolling": len(solved), "asked": len(exact)}
+        errors_by_fitting[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
+    return {"exact": figures, "ways": errors_by_fitting, "rolling": len(solved), "asked": len(exact)}
 
 
 def _approach_of(shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
     exact = exact_normal(shape, EXACT_CELLS, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(shape.distance, PAIR, load=shape.load, options=way).approach / exact - 1.0
-        for name, way in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
+        name: press(shape.distance, PAIR, load=shape.load, options=fitting_options).approach / exact - 1.0
+        for name, fitting_options in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
     }
 
 
@@ -141,7 +144,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
     errors = {}
     for position in placed_wheelsets():
         pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
-        along = np.cos(min(part.patch.lean for part in pressed.patches))
+        along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
         error = pressed.approach * along / exact_placed(position, pressed, EXACT_CELLS).approach - 1.0
@@ -151,7 +154,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
 
 def _box_around(normal_contact: NormalContact) -> Box:
     """Box around all patches of a contact, enlarged by a fifth of its size on every side."""
-    x0, x1, y0, y1 = np.array([part.box for part in normal_contact.patches]).T
+    x0, x1, y0, y1 = np.array([patch_pressure.box for patch_pressure in normal_contact.patches]).T
     (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
     wide, high = 0.2 * (high_x - low_x), 0.2 * (high_y - low_y)
     return low_x - wide, high_x + wide, low_y - high, high_y + high
@@ -212,23 +215,23 @@ def _jump_row(jump: float) -> Row:
 def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
     rows = []
     for name, case in shapes.items():
-        place = "contact_simplified." + "_".join(re.findall(r"\w+", name))
+        row_name = "contact_simplified." + "_".join(re.findall(r"\w+", name))
         best = case["ways"]["elliptic"]
         rows.append(
             Observed(
-                f"{place}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
+                f"{row_name}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
             ).at_most(100.0 * APPROACH, FIGURE, "native")
         )
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
-                Observed(f"{place}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
+                Observed(f"{row_name}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
                     0.0, ABOUT, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
             Observed(
-                f"{place}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
+                f"{row_name}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
             ).beside(0.0, ABOUT, "native")
         )
     return rows
@@ -238,12 +241,12 @@ def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
     """Rows: largest error of the approach among contact areas that have merged, and among wheels on rails."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
-    for place, what, chosen in kinds:
+    for row_name, what, chosen in kinds:
         errors = {name: abs(case["each"]) for name, case in grown.items() if name.startswith("S1002") == chosen}
         worst = max(errors, key=errors.__getitem__)
         rows.append(
             Observed(
-                f"contact_simplified.{place}.approach",
+                f"contact_simplified.{row_name}.approach",
                 SYSTEM,
                 f"error of the approach, {len(errors)} {what}, worst: {worst}",
                 100.0 * errors[worst],
@@ -253,30 +256,30 @@ def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
     return rows
 
 
-def _time_rows(times: dict[str, list[float]]) -> list[Row]:
+def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
         Observed(
             "contact_simplified.time.forces",
             SYSTEM,
-            f"ratio of the time of FASTSIM twice with the refit, {cost(times['roll'])}, to that of "
-            f"the 1982 program, {cost(times['1982'])}",
-            _ratio(times, "roll", "1982"),
+            f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
+            f"the 1982 program, {cost(seconds_by_program['1982'])}",
+            _ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
             "contact_simplified.time.exact",
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
-            f"{cost(times['exact'])}, to that of this method, {cost(times['press'])}",
-            _ratio(times, "exact", "press"),
+            f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
+            _ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),
     ]
 
 
-def _ratio(times: dict[str, list[float]], first: str, other: str) -> float:
-    return float(np.median(times[first]) / np.median(times[other]))
+def _ratio(seconds_by_program: dict[str, list[float]], first: str, other_program: str) -> float:
+    return float(np.median(seconds_by_program[first]) / np.median(seconds_by_program[other_program]))
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -293,13 +296,13 @@ def tables(data: dict[str, Any]) -> list[Table]:
     rows = tuple(
         (
             name,
-            way,
+            fitting_options,
             *(signed(100.0 * errors[key]) for key in ("approach", "area", "peak")),
             f"{errors['force']:.1f}",
             f"{errors['force_max']:.1f}",
         )
         for name, case in data["shapes"].items()
-        for way, errors in case["ways"].items()
+        for fitting_options, errors in case["ways"].items()
     )
     note = (
         f"Errors against the exact contact on {EXACT_CELLS} x {EXACT_CELLS} cells. Forces: mean and largest over "
@@ -376,7 +379,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     shapes = data["shapes"]
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
-    place = np.arange(len(shapes))
+    shape_positions = np.arange(len(shapes))
     for axis, (key, label) in zip(
         axes,
         {
@@ -387,12 +390,17 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         }.items(),
         strict=True,
     ):
-        for way, mark in (("elliptic", "o"), ("paper", "x")):
+        for fitting_options, mark in (("elliptic", "o"), ("paper", "x")):
             scale = 1.0 if key == "force" else 100.0
-            axis.plot([scale * case["ways"][way][key] for case in shapes.values()], place, mark, label=way)
+            axis.plot(
+                [scale * case["ways"][fitting_options][key] for case in shapes.values()],
+                shape_positions,
+                mark,
+                label=fitting_options,
+            )
         axis.axvline(0.0, color="0.7", linewidth=0.8)
         axis.set_xlabel(label)
-    axes[0].set_yticks(place, list(shapes))
+    axes[0].set_yticks(shape_positions, list(shapes))
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
     add_heading(figure, "Theory of 1983 against exact contact: errors with Hertz's and with the paper's pressure")

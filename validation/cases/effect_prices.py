@@ -50,11 +50,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     the rounds, and each effect in one of the three engines, in turn.
     """
     with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        write_files(place)
-        ratios = {engine: _ratio(engine, place, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
+        files_folder = Path(name)
+        write_files(files_folder)
+        ratios = {engine: _ratio(engine, files_folder, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
         price = [
-            _price(effect, engine, place, PRICED[quick])
+            _price(effect, engine, files_folder, PRICED[quick])
             for i, effect in enumerate(EFFECTS)
             for j, engine in enumerate(ENGINES)
             if not quick or i % len(ENGINES) == j
@@ -72,7 +72,7 @@ def hand_built(engine: str, bare: Scene) -> Any:
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
+def _ratio(engine: str, folder: Path, steps: int, round_count: int) -> Saved:
     """Ratio of computing times between twinrig's bare model and the hand-built one, and the largest difference of their
     states.
 
@@ -82,7 +82,7 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
     ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(steps + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
     jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
-    seconds = interleave(jobs, rounds, round_interval=(1, 1, SELDOM), clock=time.process_time)
+    seconds = interleave(jobs, round_count, round_interval=(1, 1, SELDOM), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
         "gap": gap,
@@ -119,10 +119,12 @@ def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
     ]
 
 
-def ratio_row(row: str, title: str, ratio: tuple[float, float, float], why: str) -> Row:
+def ratio_row(row: str, title: str, ratio: tuple[float, float, float], tolerance_reason: str) -> Row:
     """Row with a ratio of computing times and its interval."""
     value, low, high = ratio
-    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
+    return Observed(row, SYSTEM, f"{title}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(
+        DEAREST, tolerance_reason
+    )
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
@@ -252,20 +254,21 @@ def _contact(quick: bool) -> list[Row]:
 
 def _choice() -> Row:
     """Row: ratio of the time to choose the effects of a linear car to the time of its full covariance."""
-    (ratio, low, high), told = price_of_choice()
+    (ratio, low, high), predicted_seconds = price_of_choice()
     return Observed(
         "effect_prices.choice",
         SYSTEM,
         "ratio of the time of a linear choice of effects to that of the full covariance of the same scene, a car of 19 "
-        f"degrees of freedom, 95 % interval {low:.3g} to {high:.3g}; the time told beforehand is {told:.2g} times that",
+        f"degrees of freedom, 95 % interval {low:.3g} to {high:.3g}; the time told beforehand is "
+        f"{predicted_seconds:.2g} times that",
         ratio,
         "times",
     ).aim(20.0, "seconds of the processor, median of interleaved rounds")
 
 
-def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
+def _price(effect: str, engine: str, folder: Path, round_count: int) -> Saved:
     """One line of the price list: time per step in microseconds that an effect adds in an engine, with its counts."""
-    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], rounds, 5e-3)
+    seconds = interleave([_job(bare, engine) for bare in pair(effect, TIMED_STEPS, folder)], round_count, 5e-3)
     added = (seconds[1] - seconds[0]) / TIMED_STEPS * 1e6
     return {
         "effect": effect,
@@ -298,13 +301,13 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
 
 
-def _line(entry: Saved) -> tuple[str, ...]:
-    value, low, high = entry["ratio"]
+def _line(saved_entry: Saved) -> tuple[str, ...]:
+    value, low, high = saved_entry["ratio"]
     return (
-        entry["effect"],
-        entry["engine"],
-        entry["adds"],
-        f"{entry['step']:.2f}",
-        f"{entry['us']['median']:+.2f} +/- {entry['us']['mad']:.2f}",
+        saved_entry["effect"],
+        saved_entry["engine"],
+        saved_entry["adds"],
+        f"{saved_entry['step']:.2f}",
+        f"{saved_entry['us']['median']:+.2f} +/- {saved_entry['us']['mad']:.2f}",
         f"{value:.2f} ({low:.2f} to {high:.2f})",
     )

@@ -68,9 +68,9 @@ def truth(scene: Scene) -> np.ndarray:
     return moment(scene, "reference", Settings("RK4", PERIOD / 16, scene.run.duration))
 
 
-def relative(computed: np.ndarray, true: np.ndarray) -> float:
+def relative(computed_values: np.ndarray, true_moment: np.ndarray) -> float:
     """Ratio of the rms difference to the rms of the true moment."""
-    return float(np.sqrt(np.mean((computed - true) ** 2) / np.mean(true**2)))
+    return float(np.sqrt(np.mean((computed_values - true_moment) ** 2) / np.mean(true_moment**2)))
 
 
 @on_paper_road()
@@ -112,15 +112,15 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
     return rows
 
 
-def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
+def _uncertainty(scene: Scene, true_moment: np.ndarray) -> Row:
     """Row: uncertainty of the true moment, as its difference from an adaptive solver of another family at a tolerance
     of 1e-11."""
-    other = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
+    by_other_solver = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
     return Observed(
         "moment.reference",
         SYSTEM,
         "uncertainty of the moment of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
-        relative(other, true),
+        relative(by_other_solver, true_moment),
         "of its rms",
     ).at_most(BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 

@@ -75,14 +75,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + answers + timed, data
 
 
-def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
+def creepages(kind_names: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
     where C is C11, C22 or C23 c."""
-    ratio, kind, level = (grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kinds)), levels, indexing="ij"))
-    part = np.array([KINDS[name] for name in kinds])[kind] * level[:, None]
+    ratio, kind, level = (
+        grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kind_names)), levels, indexing="ij")
+    )
+    creepage_parts = np.array([KINDS[name] for name in kind_names])[kind] * level[:, None]
     known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
     scale = unit / np.stack([known.c11, known.c22, known.c23 * MEAN_AXIS], axis=1)
-    xi_x, xi_y, spin = (part * scale).T
+    xi_x, xi_y, spin = (creepage_parts * scale).T
     a, b = MEAN_AXIS * np.sqrt(ratio), MEAN_AXIS / np.sqrt(ratio)
     return {
         "a": a,
@@ -142,12 +144,12 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     return rows, {"cells": data}
 
 
-def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
+def _invariants(batch_count: int, contact_count: int, first: int) -> list[Row]:
     """Rows on invariants of the forces, over random contacts."""
     answers: dict[str, float] = {}
     for i in range(batch_count):
         options = COMPUTED_OPTIONS[i % len(COMPUTED_OPTIONS)]
-        for name, value in worst_violation(random_contacts(SEED, first + i, count), options, PAIR).items():
+        for name, value in worst_violation(random_contacts(SEED, first + i, contact_count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
             answers[name] = max(answers.get(name, 0.0), value)
     what = {
@@ -164,7 +166,7 @@ def _invariants(batch_count: int, count: int, first: int) -> list[Row]:
         "similarity": "difference of the forces at eight times the load and twice the size from the law of similarity",
         "stick": "excess of the share of stick beyond 0 to 1",
     }
-    total = batch_count * count
+    total = batch_count * contact_count
     return [
         Observed(
             f"fastsim.always.{name.replace(' ', '_')}",

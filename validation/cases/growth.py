@@ -72,7 +72,7 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true: Result, folder: Path, quick: bool) -> Saved:
+def _spread(true_run: Result, folder: Path, quick: bool) -> Saved:
     """Standard deviations of pitch and heave at 1 to 10 s by three routes: Monte Carlo (full run only), covariance
     along the path, and closed laws."""
     times, assembly = np.arange(1, LENGTH + 1), assembly_of_scene(_noisy(folder, LENGTH))
@@ -81,7 +81,7 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     q = rigid_pitch(p).noise_intensity(DEVIATION, 1 / RATE)
     carried = covariance(quiet, DEVIATION)
     alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
-    rates = {"run": true["pitch_rate"], "forces": alone}
+    rates = {"run": true_run["pitch_rate"], "forces": alone}
     spreads = {
         f"law, {name}": np.sqrt(pitch_variance(times, sinh_law_rate(rate, 1 / RATE, p)[at], q))
         for name, rate in rates.items()
@@ -94,7 +94,7 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
         "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
-        job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
+        job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true_run["pitch"])
         off = run_paths(job, PATHS)["states"] - path_of(quiet).carry_errors(np.zeros((1, 8)))[0][at]
         spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
     return {name: values.tolist() for name, values in spreads.items()}

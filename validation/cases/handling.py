@@ -235,14 +235,14 @@ def _energy_rows() -> list[Row]:
                 "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
             )
             gaps[name, step] = float(np.abs(unaccounted(drive)).max())
-    whole = drive_energy(drive)[0]
+    start_energy = drive_energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [
         Observed(
             "handling.ledger",
             SYSTEM,
             "error of the energy balance of the lane change, relative to its total energy",
-            gaps["sliding", 1e-3] / whole,
+            gaps["sliding", 1e-3] / start_energy,
             "",
         ).at_most(
             1e-7,
@@ -324,12 +324,12 @@ def _threads_row() -> Row:
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
     with installed(built.law):
         serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
-    said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
+    outcome = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaviour_row(
         "handling.threads",
         SYSTEM,
         "three lane changes computed by MuJoCo in two threads and in one: equal to the last bit",
-        said,
+        outcome,
         "identical",
         "the callback writes nothing but its own run's forces",
         "none",
@@ -349,16 +349,16 @@ def _march(handling: Handling, steps: int) -> Callable[[], Any]:
     return job
 
 
-def _repeat_tyres(times: int) -> None:
+def _repeat_tyres(repeats: int) -> None:
     """Evaluate the forces of four slightly slipping tyres a number of times."""
     of = net(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8
-    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
+    _repeat_forces(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, repeats)
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_forces(contacts, slides, strips, cells, middle, forces, times):
-    for _ in range(times):
-        tyre_forces(contacts, slides, strips, cells, middle, forces)
+def _repeat_forces(contacts, slides, strips, cells, middle_cells, forces, repeats):
+    for _ in range(repeats):
+        tyre_forces(contacts, slides, strips, cells, middle_cells, forces)

@@ -28,13 +28,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in quick_cases(known) if quick else known:
-        with TemporaryDirectory() as place:
-            outcomes = {name: judge(case, name, Path(place)) for name in case.judged()}
-            naive = case.naive(Path(place)) if case.naive else ""
+        with TemporaryDirectory() as files_folder:
+            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
+            naive = case.naive(Path(files_folder)) if case.naive else ""
         rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
-        told = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
-        said = {name: asdict(outcome) for name, outcome in outcomes.items()}
-        data.append({"family": family, **told, "outcomes": said, "naive": naive})
+        told_errors = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
+        sentence = {name: asdict(outcome) for name, outcome in outcomes.items()}
+        data.append({"family": family, **told_errors, "outcomes": sentence, "naive": naive})
     words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
     counted = sum(family not in FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
@@ -43,14 +43,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "hard.silent",
             SYSTEM,
             f"silent wrong answers in {share} hard cases, {sum(map(len, words))} outcomes",
-            sum(place.count("SILENT") for place in words),
+            sum(files_folder.count("SILENT") for files_folder in words),
             "",
         ).at_most(0.0, "a finite wrong answer without a word is never accepted", "none"),
         Observed(
             "hard.passed",
             SYSTEM,
             "hard cases in which every implementation gives a right answer, refuses, or reports its failure",
-            sum("SILENT" not in place for place in words),
+            sum("SILENT" not in files_folder for files_folder in words),
             "cases",
         ).within(len(data), 0, f"every one; {share} were run", "none"),
         Observed(
@@ -145,8 +145,8 @@ def _table_of_cases(entries: list[Saved]) -> Table:
     return Table(TITLE, note, ("case", "what is hard", "checked against", *IMPLEMENTATIONS, "without the guard"), rows)
 
 
-def _allowed(entry: Saved) -> str:
-    return f" (allowed {entry['tolerance']:.0e} {entry['unit']})" if entry["unit"] else ""
+def _allowed(saved_entry: Saved) -> str:
+    return f" (allowed {saved_entry['tolerance']:.0e} {saved_entry['unit']})" if saved_entry["unit"] else ""
 
 
 def _cell(outcome: Saved) -> str:

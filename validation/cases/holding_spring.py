@@ -96,8 +96,8 @@ def _error(setting: Setting, stiffness: float, free_runs: FreeRuns, engine: str 
     """Largest pitch error (rad) of a run with a holding spring of a stiffness (N m/rad)."""
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
-    held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - free_runs.pitch).max())
+    held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
+    return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
 
 
 def _rows_of_limits(setting: Setting, free_runs: FreeRuns, engine: str) -> list[Row]:

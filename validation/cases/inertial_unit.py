@@ -70,7 +70,7 @@ def _attitude_from_exact_rates() -> list[Row]:
     """Rows: error of the attitude integrated from exact rates, about a fixed axis and about an axis that moves on a
     cone."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
-    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
+    attitudes = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START_ATTITUDE)
     rates, true = coning_motion(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
     off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
@@ -79,7 +79,7 @@ def _attitude_from_exact_rates() -> list[Row]:
     order = "fourth order in the sampling period, without noise"
     return [
         _closed_form_row(
-            "clean.axis", fixed, largest_angle(held[-1], turned), "rad", "each step is the exact exponential"
+            "clean.axis", fixed, largest_angle(attitudes[-1], turned), "rad", "each step is the exact exponential"
         ),
         _closed_form_row("clean.cone", swept, largest_angle(coned, true), "rad", order),
         _closed_form_row(
@@ -88,9 +88,13 @@ def _attitude_from_exact_rates() -> list[Row]:
     ]
 
 
-def _closed_form_row(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
+def _closed_form_row(
+    id: str, quantity: str, value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(bound, why, "closed form")
+    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(
+        bound, tolerance_reason, "closed form"
+    )
 
 
 def _one_axis(paths: int) -> list[Row]:
@@ -125,13 +129,13 @@ def _one_axis(paths: int) -> list[Row]:
     return rows
 
 
-def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> Row:
+def _mean(id: str, quantity: str, samples: np.ndarray, law: float, tolerance_reason: str) -> Row:
     """Row for a mean that must lie within LEVEL standard errors of its theoretical value."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
         law,
         LEVEL * error,
-        f"{why}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
+        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
         "closed form",
     )
 
@@ -308,12 +312,16 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     }
 
 
-def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true`` (601, 4)."""
+def _path(path: int, rates: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
+    """Error angles (601, 3) in degrees of one noisy path, about the global axes, at the times of ``true_attitudes``
+    (601, 4).
+    """
     attitudes = measured_attitude(
         rates, 1 / SAMPLING_RATE, RATE_DEVIATION * np.ones(3), START_ATTITUDE, range(path, path + 1), SEED
     )
-    return np.degrees(rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
+    return np.degrees(
+        rotation_vector(error_rotation(attitudes[:: len(rates) // (len(true_attitudes) - 1), 0], true_attitudes))
+    )
 
 
 def _bias(paths: int) -> list[Row]:
@@ -347,13 +355,13 @@ def _section_forces() -> list[Row]:
     """Rows: a slowly growing pitch error only rotates the section forces, shown with runs whose pitch is prescribed."""
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
-        place = Path(name)
-        measured, follow = measure_road(scene), follower_builder(scene, place)
-        write_measurement(measured, place, scene.run.step)
+        run_folder = Path(name)
+        measured, follow = measure_road(scene), follower_builder(scene, run_folder)
+        write_measurement(measured, run_folder, scene.run.step)
         true = simulate(follow({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
-        part = measured.times / scene.run.duration
-        wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)
-        write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
+        section_part = measured.times / scene.run.duration
+        wrong = measured["pitch"] + size * section_part**3 * (10 - 15 * section_part + 6 * section_part**2)
+        write_time_series(run_folder / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
         guided = simulate(follow({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
     pairs = ((guided, guided), (true, guided), (true, true))
     corrected, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)

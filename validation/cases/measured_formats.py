@@ -237,8 +237,10 @@ def resolution(folder: Path) -> list[Row]:
     path = write(folder / "choice.rsp", [ChannelGroup(("Fz",), ("N",), ("",), 1e-3, len(load), [load[:, None]])])
     floating = read(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
-    whole = step * np.round(load / step)
-    errors = [abs(pseudo_damage(damaged[:4500]) / pseudo_damage(load[:4500]) - 1.0) for damaged in (floating, whole)]
+    rounded_load = step * np.round(load / step)
+    errors = [
+        abs(pseudo_damage(damaged[:4500]) / pseudo_damage(load[:4500]) - 1.0) for damaged in (floating, rounded_load)
+    ]
     why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
     return [
         Observed(
@@ -303,14 +305,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     )
     rows = tuple(
         (
-            each["format"],
-            f"{each['values']:.1e}",
-            f"{each['times']:.1e}",
-            f"{each['library']}: {each['own']:.1e}",
-            f"{each['size'] / 1e3:.0f}",
-            f"{each['rate'] / 1e6:.1f}",
+            format_row["format"],
+            f"{format_row['values']:.1e}",
+            f"{format_row['times']:.1e}",
+            f"{format_row['library']}: {format_row['own']:.1e}",
+            f"{format_row['size'] / 1e3:.0f}",
+            f"{format_row['rate'] / 1e6:.1f}",
         )
-        for each in data["formats"]
+        for format_row in data["formats"]
     )
     headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

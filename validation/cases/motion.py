@@ -140,15 +140,15 @@ def _tilt() -> Row:
     )
 
 
-def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
+def _gains(sample_count: int) -> tuple[list[list[float]], list[Row]]:
     """Noise of the angular acceleration by Monte Carlo and by its law, for several heights of the fifth sensor."""
     rows, lines = [], []
     for i, height in enumerate((*HEIGHTS, 0.0)):
         line = [height]
         for formula in ("spatial", "plane") if height else ("plane",):
             array = sensor_array(tilted_sensors(height, np.eye(3)), formula)
-            noise = normal_samples(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
-            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((count, 3)))
+            noise = normal_samples(SEED, i, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
+            alpha = angular_acceleration(spin_from_readings(array, noise), np.zeros((sample_count, 3)))
             axis = int(np.argmax(array.noise_gains()))
             law, variance = float(array.noise_gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
@@ -163,8 +163,8 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
                         "1/m^2",
                     ),
                     law,
-                    count,
-                    f"{count:,} samples; gain {law**0.5:.3g} 1/m",
+                    sample_count,
+                    f"{sample_count:,} samples; gain {law**0.5:.3g} 1/m",
                 )
             )
             line += [law**0.5, variance**0.5]
@@ -275,9 +275,9 @@ def _recovered_errors(
     ]
 
 
-def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
+def _moving(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     """A body that turns all the time: true rates (n, 3), sensor array, and noise-free readings without gravity."""
-    t = PERIOD * np.arange(count)
+    t = PERIOD * np.arange(sample_count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
     array = sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
@@ -288,8 +288,8 @@ def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     )
 
 
-def _noise(path: int, count: int) -> np.ndarray:
-    return NOISE * normal_samples(SEED + 1, path, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
+def _noise(path: int, sample_count: int) -> np.ndarray:
+    return NOISE * normal_samples(SEED + 1, path, sample_count, 15, source=ACCELEROMETERS).reshape(sample_count, 5, 3)
 
 
 def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
@@ -326,11 +326,14 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
         filter_rates(spin_from_readings(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE)
         for path in range(paths)
     ]
-    squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in filtered], axis=0)
+    squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
     walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
-    late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
+    late, early = (
+        float(np.sqrt(np.mean(covariance_part)))
+        for covariance_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
+    )
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
         Observed(

@@ -89,9 +89,9 @@ def tables(data: Saved) -> list[Table]:
         "only one, would have let the fault pass."
     )
     headings = ("system", "planted in", "fault", "caught by", "would have been missed by")
-    whole = Table("Planted faults of all systems", note, headings, tuple(lines))
+    overview = Table("Planted faults of all systems", note, headings, tuple(lines))
     return [
-        whole,
+        overview,
         *pitch_plane.tables(data["pitch-plane"]),
         *(campaign.table(data[campaign.id]) for campaign in CAMPAIGNS),
     ]

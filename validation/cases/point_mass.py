@@ -124,10 +124,10 @@ def _discrete_error(damped: float, steps: int) -> float:
         return _largest_relative_error(euler_covariance(steps, DEVIATION, step, MASS, eta), truth)
 
 
-def _largest_relative_error(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal]) -> float:
     return max(
         float(abs(Decimal(float(value)) / true - 1))
-        for value, true in zip(computed[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+        for value, true in zip(computed_values[[0, 0, 1], [0, 1, 1]], truth, strict=False)
     )
 
 
@@ -138,14 +138,14 @@ def _difference(damped: float, steps: int) -> float:
     return 1 - float(euler_covariance(steps, *arguments)[0, 0] / continuous_covariance(TIME, *arguments)[0, 0])
 
 
-def _monte_carlo(damped: float, count: int) -> list[Row]:
+def _monte_carlo(damped: float, path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
     arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
-    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(count, steps, *arguments, seed=SEED)
+    law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
-    why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
+    why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
@@ -156,7 +156,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
                 "m^2",
             ),
             float(law[0, 0]),
-            count,
+            path_count,
             why,
         ),
         mean_square(
@@ -169,7 +169,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
                 "",
             ),
             1.0,
-            2 * count,
+            2 * path_count,
             why,
         ),
     ]
@@ -193,10 +193,10 @@ def draw(data: Saved) -> Drawn:
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
         exact = [continuous_covariance(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
-        whole = np.unique(np.geomspace(10, 1e5, 13).astype(int))
-        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
+        step_counts = np.unique(np.geomspace(10, 1e5, 13).astype(int))
+        euler = [euler_covariance(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in step_counts]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
-        axes[0].loglog(whole * STEP, euler, "o", color=f"C{i}", markersize=3.5)
+        axes[0].loglog(step_counts * STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
     steps, *columns = np.array(data["differences"]).T

@@ -85,36 +85,38 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
-def _beside(quick: bool, rounds: int) -> CaseAnswer:
+def _beside(quick: bool, round_count: int) -> CaseAnswer:
     """Rows and data of price cases that are not problems for the common runner: ride, shares of a step, force calls,
     claims about speed."""
     road = assembly_of_scene(road_excited.scene())
-    rows, prices = ride.measure(quick, rounds, SHORTEST_TURN[True])
-    twice, least, duration = 2 * rounds, 2 * SHORTEST_TURN[quick], road_excited.DURATION
+    rows, prices = ride.measure(quick, round_count, SHORTEST_TURN[True])
+    twice, least, duration = 2 * round_count, 2 * SHORTEST_TURN[quick], road_excited.DURATION
     data: Saved = {
         "ride": prices,
-        "split": [] if quick else split.measure(rounds, SHORTEST_TURN[quick]),
+        "split": [] if quick else split.measure(round_count, SHORTEST_TURN[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, twice, least) for name in ("RK4", "Euler")},
         "real time": speed.real_time(road, duration, twice, least),
     }
-    settings = dict.fromkeys(_at_1_ms(each) for each in road_excited.settings(quick) if each.method != "DVERK6")
+    settings = dict.fromkeys(
+        _at_1_ms(problem_rows) for problem_rows in road_excited.settings(quick) if problem_rows.method != "DVERK6"
+    )
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, rounds: int, make_problem: Make) -> CaseAnswer:
+def _priced(quick: bool, round_count: int, make_problem: Make) -> CaseAnswer:
     """The rows and the saved data of a problem."""
     problem = make_problem(quick)
-    measured = runner.measure(problem, quick, rounds, SHORTEST_TURN[quick])
+    measured = runner.measure(problem, quick, round_count, SHORTEST_TURN[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _in_processes(rounds: int) -> tuple[list[CaseAnswer], CaseAnswer]:
+def _in_processes(round_count: int) -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems and the further cases, computed by at most two processes. The first problem is computed last; only
     the road, which takes long, is started before."""
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        first, *others = PROBLEMS + FULL_ONLY
-        road, beside = pool.submit(_priced, False, rounds, first), pool.submit(_beside, False, rounds)
-        priced = [*pool.map(partial(_priced, False, rounds), others[::-1])][::-1]
+        first, *other_problems = PROBLEMS + FULL_ONLY
+        road, beside = pool.submit(_priced, False, round_count, first), pool.submit(_beside, False, round_count)
+        priced = [*pool.map(partial(_priced, False, round_count), other_problems[::-1])][::-1]
         return [road.result(), *priced], beside.result()
 
 
@@ -158,9 +160,9 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted_calls(engine, assembly, road_excited.settings_of(each, COUNTED_DURATION))
-            for each in settings
-            if each.engine == engine
+            counted_calls(engine, assembly, road_excited.settings_of(counted_setting, COUNTED_DURATION))
+            for counted_setting in settings
+            if counted_setting.engine == engine
         ]
         what = (
             f"largest difference between force calls counted from outside ({how}) and those reported, {len(pairs)} runs"
@@ -170,7 +172,7 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
                 f"price.road.counts.{engine}",
                 SYSTEM,
                 what,
-                max(abs(outside - said) for outside, said in pairs),
+                max(abs(outside - quantity) for outside, quantity in pairs),
                 "calls",
             ).within(
                 0,
@@ -208,8 +210,8 @@ def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
     if factors is None:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
     factor, low, high = factors
-    told = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
-    return Observed(name, SYSTEM, told, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
+    quantity = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
+    return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
 
 
 def tables(data: Saved) -> list[Table]:

@@ -117,12 +117,12 @@ def _coverage(fits: list[Uncertainty]) -> float:
     """Least share of measured samples inside the prediction bands, over all fits and channels. Each fit's bands are
     compared with the measurement of the next noise sample."""
     shares = []
-    for known, other in zip(fits, [*fits[1:], fits[0]], strict=True):
+    for known, other_fit in zip(fits, [*fits[1:], fits[0]], strict=True):
         problem = known.fit.problem
         predicted = problem.predicted(known.fit.values)
         pairs = zip(predicted, problem.channels, strict=True)
         errors = [error_model(row - channel.values, row) for row, channel in pairs]
-        fresh = replace(problem, channels=other.fit.problem.channels)
+        fresh = replace(problem, channels=other_fit.fit.problem.channels)
         shares.append(error_bands(fresh, known, errors).share_inside())
     return float(np.mean(shares, axis=0).min())
 
@@ -173,12 +173,12 @@ def _sensors_row(path: Path) -> Row:
     felt = clock.filtered(sensed)
     slope, offset = np.polyfit(moved, felt, 1)
     error = float(np.sqrt(np.mean((felt - moved) ** 2) / np.mean(felt**2)))
-    said = (
+    quantity = (
         "lateral acceleration of the first stretch beside that of measured speed, yaw rate and side slip: error by its "
         f"rms; slope {slope:.3f}, offset {offset:.2f} m/s^2"
     )
     why = "no model takes part: what sensors leave of the error of a prediction"
-    return Observed("race_car.sensors", SYSTEM, said, error, "").beside(0.0, why, "measured")
+    return Observed("race_car.sensors", SYSTEM, quantity, error, "").beside(0.0, why, "measured")
 
 
 def _not_run(reason: str) -> list[Row]:
@@ -189,6 +189,8 @@ def _saved(identified: Identified) -> dict[str, Any]:
     known = identified.uncertainty
     return {
         "estimates": dict(zip([p.name for p in known.fit.problem.parameters], known.fit.values.tolist(), strict=True)),
-        "standard errors": [None if np.isnan(each) else float(each) for each in known.deviations],
+        "standard errors": [
+            None if np.isnan(standard_error) else float(standard_error) for standard_error in known.deviations
+        ],
         "errors": dict(zip(AIMS, identified.bands.relative_error().tolist(), strict=True)),
     }

@@ -58,13 +58,13 @@ def _shared(folder: Path) -> list[Judged]:
         ]
 
 
-def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
+def judged(system: str, scene_number: int, folder: Path, engines: tuple[str, ...] = ENGINES) -> Judged:
     """Verdicts on the recommendations for a random scene of a system, and the reasons of refusals. There are no
     verdicts if the scene was refused more than REDRAWS times."""
     refused: list[str] = []
-    for n in range(number, number + (REDRAWS + 1) * STRIDE, STRIDE):
+    for n in range(scene_number, scene_number + (REDRAWS + 1) * STRIDE, STRIDE):
         try:
-            told = (
+            reasons = (
                 judge(drawn(n, folder), engines)
                 if system == "pitch-plane"
                 else unseen_systems.judge(unseen_systems.drawn_scene_of_system(system, n))
@@ -72,7 +72,7 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
         else:
-            return told, refused
+            return reasons, refused
     return [], refused
 
 
@@ -80,7 +80,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     """Rows on the three promises of a recommendation; a scene counts as kept if every recommended setting keeps its
     promise."""
     every = [verdict for of_scene in verdicts for verdict in of_scene]
-    held = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
+    kept_scenes = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
     factors = [verdict.factor for verdict in every]
     scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
@@ -88,7 +88,7 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
             "recommendation.met",
             SYSTEM,
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
-            held / len(verdicts),
+            kept_scenes / len(verdicts),
             "",
         ).within(1.0, 1.0 - LEAST_MET_SHARE, why, "closed form"),
         Observed(

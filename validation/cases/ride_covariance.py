@@ -112,9 +112,9 @@ def _compared(
         stationary_covariance(vehicle_with_road(vehicle, road, speed)),
         variances_by_quadrature(analytic, road, speed),
     )
-    told = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
-    worst = largest_relative_error(covariance.deviation[told], np.sqrt(integrals.variance[told]))
-    return worst, covariance.error[told].max(), integrals.error[told].max(), int(told.sum())
+    is_finite = covariance.variance > SYMMETRY_ZERO * covariance.variance.max()
+    worst = largest_relative_error(covariance.deviation[is_finite], np.sqrt(integrals.variance[is_finite]))
+    return worst, covariance.error[is_finite].max(), integrals.error[is_finite].max(), int(is_finite.sum())
 
 
 def _closed_rows() -> list[Row]:
@@ -244,14 +244,14 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     seconds = time.process_time() - start
     some = slice(None, None, max(1, len(speeds) // 6))
     slow = variance_sweep(linear, roads, speeds[some], FILTERS, fast=False)
-    told = slow.variance > SYMMETRY_ZERO * slow.variance.max()
+    is_finite = slow.variance > SYMMETRY_ZERO * slow.variance.max()
     rows = [
         Observed(
             "ride_covariance.fast.equal",
             SYSTEM,
             "difference of the variances by the fast route from the direct route, three weighted "
             "seats, worst of all outputs",
-            largest_relative_error(quick.variance[:, some][told], slow.variance[told]),
+            largest_relative_error(quick.variance[:, some][is_finite], slow.variance[is_finite]),
             "",
         ).at_most(1e-10, "asked", "none"),
         behaviour_row(
@@ -310,11 +310,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     shown = data["figure"]
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
-    for axis, place in zip(axes, BODY_POINTS, strict=True):
+    for axis, body_point in zip(axes, BODY_POINTS, strict=True):
         for i, case in enumerate(shown["cases"]):
             words = "left/right {}, front/rear {}".format(*CORRELATION_CASES[int(case)])
-            axis.plot(shown["speeds"], shown[place][i], label=f"{case}: {words}")
-        axis.set(title=place, xlabel="speed [m/s]")
+            axis.plot(shown["speeds"], shown[body_point][i], label=f"{case}: {words}")
+        axis.set(title=body_point, xlabel="speed [m/s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
     legend_below(figure, axes[0], columns=2)

@@ -113,10 +113,11 @@ def _fixed_point() -> list[Row]:
     """Rows: statistical linearisation converges, to the same gains from another start; gravity has no effect on a
     vehicle that only moves vertically."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, 4.0)
-    first, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
+    first, from_other_start = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
     apart = [
-        largest_relative_error(each.covariance.deviation, first.covariance.deviation) for each in (other, unloaded)
+        largest_relative_error(linearised.covariance.deviation, first.covariance.deviation)
+        for linearised in (from_other_start, unloaded)
     ]
     return [
         Observed(
@@ -210,7 +211,7 @@ def _alone() -> list[Row]:
     """Rows: each nonlinear law alone, at the road level at which statistical linearisation is least accurate."""
     vehicle, _ = vehicle_and_road(NONLINEAR_VEHICLE)
     spring = vehicle.springs[0]
-    others: dict[str, tuple[float, dict[str, Any]]] = {
+    law_cases: dict[str, tuple[float, dict[str, Any]]] = {
         "damper": (4.0, {"travel_force": None, "friction": 0.0}),
         "friction of 100 N": (
             0.25,
@@ -219,14 +220,14 @@ def _alone() -> list[Row]:
         "stops": (64.0, {"rate_force": None, "damping": MILD_DAMPING, "friction": 0.0}),
     }
     rows = []
-    for name, (level, laws) in others.items():
+    for name, (level, laws) in law_cases.items():
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
         copies = copies_in_time(alone, road, SPEED, LASTING[1], copies=COPIES[1] // 2, seed=SEED)
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
-        kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
-        worst = int((error / kept).argmax())
+        curve_kept = [promised_error(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
+        worst = int((error / curve_kept).argmax())
         rows.append(
             Observed(
                 f"ride_nonlinear.alone.{name.split()[0]}",
@@ -236,7 +237,7 @@ def _alone() -> list[Row]:
                 float(error[worst]),
                 "",
             ).at_most(
-                float(kept[worst]),
+                float(curve_kept[worst]),
                 f"left out {100 * linear.left_out[worst]:.2g} %: the promise, and 4 standard errors",
                 "none",
             )

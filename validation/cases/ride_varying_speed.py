@@ -143,13 +143,13 @@ def _damped() -> Row:
     moves."""
     varied = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
     force, moving = varied.of("tyre force front left"), varied.speed > 0.0
-    said = "infinite" if np.isinf(force[moving]).all() else "finite"
-    said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
+    outcome = "infinite" if np.isinf(force[moving]).all() else "finite"
+    outcome += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
     return behaviour_row(
         "ride_varying_speed.damped",
         SYSTEM,
         "half_car with tyre damping: variance of the tyre force while driving, and at standstill",
-        said,
+        outcome,
         "infinite, finite",
         "white noise of the road's rate, which standstill turns off",
     )
@@ -259,10 +259,10 @@ def _constant() -> list[Row]:
     ]
 
 
-def _timed(run: Callable[..., Any], *given: Any, **more: Any) -> tuple[Any, float]:
+def _timed(run: Callable[..., Any], *arguments: Any, **keywords: Any) -> tuple[Any, float]:
     """Result of a call, and its processor time (s)."""
     start = time.process_time()
-    return run(*given, **more), time.process_time() - start
+    return run(*arguments, **keywords), time.process_time() - start
 
 
 def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:
@@ -289,10 +289,10 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
             dense_output=True,
         )
         pieces[start, stop], seen = back.sol, back.y[:, -1]
-    places, weights = _path_points(profile, cuts, road.lengths)
-    response = np.zeros((len(places), at_1.B[0].shape[1]))
+    path_points, weights = _path_points(profile, cuts, road.lengths)
+    response = np.zeros((len(path_points), at_1.B[0].shape[1]))
     for B, length in zip(at_1.B, road.lengths, strict=True):
-        met = profile.time(places + length)
+        met = profile.time(path_points + length)
         for (start, stop), adjoint in pieces.items():
             then = np.flatnonzero((met > start) & (met < stop))
             if len(then):

@@ -74,7 +74,7 @@ def _conventions() -> list[Row]:
 
     walk = normal_samples(SEED, 0, SAMPLES, 1)[:, 0].cumsum()
     white = normal_samples(SEED, 1, SAMPLES, 1)[:, 0]
-    whole = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
+    library_damage = sum(count * span**WOEHLER_SLOPE for span, _, count, _, _ in extract_cycles(walk.tolist()))
     repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
@@ -83,14 +83,14 @@ def _conventions() -> list[Row]:
             SYSTEM,
             f"relative difference of the damage of a random walk of {SAMPLES:,} samples by its "
             "turning points alone from all samples",
-            abs(pseudo_damage(walk) / whole - 1),
+            abs(pseudo_damage(walk) / library_damage - 1),
             "",
         ).at_most(1e-12, "rainflow reads turning points only; the sum is in another order", "native"),
         *(
             Observed(f"score.damage.convention.{name}", SYSTEM, what, repeated[name], "").beside(
-                f"{told} between two libraries", why
+                f"{counting_text} between two libraries", why
             )
-            for name, what, told in (
+            for name, what, counting_text in (
                 ("walk", "damage of a random walk with its residue closed, difference", 0.34),
                 ("white", "damage of white noise with its residue closed, difference", 0.001),
             )
@@ -140,7 +140,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) of the sinking run, and its largest damage error."""
     scene = force_scene(folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
-    still, moved = (simulate(each, engine) for each in (scene, sinking))
+    still, moved = (simulate(simulated_scene, engine) for simulated_scene in (scene, sinking))
     wrong = errors_of_run(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
@@ -175,7 +175,7 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
 def _study(folder: Path) -> list[Saved]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
-    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
+    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, progress_share: None)
     assert not failed, failed
     return rows
 
@@ -186,20 +186,20 @@ def _verdicts(studied: list[Saved]) -> list[Row]:
     rows = []
     for row in studied:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
-        place = f"{row['engine']}, {row['road']}: {name}"
+        run_text = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
             id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
-            rows.append(behaviour_row(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
+            rows.append(behaviour_row(id, SYSTEM, f"{run_text}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD:
             id, what, why = (
                 f"score.without-truth.{_id(row)}",
-                f"{place}, without the truth",
+                f"{run_text}, without the truth",
                 row["reason without truth"],
             )
-            told = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(behaviour_row(id, SYSTEM, what, told, "not accepted", why, "none"))
+            verdict_text = "accepted" if alone == "accepted" else "not accepted"
+            rows.append(behaviour_row(id, SYSTEM, what, verdict_text, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
+            id, what = f"score.unseen.{_id(row)}", f"{run_text}, damage ratio of f3x where the run itself shows nothing"
             why = "what an engineer without the truth cannot know"
             rows.append(Observed(id, SYSTEM, what, row["damage f3x"], "").beside(word, why, "none"))
     return rows

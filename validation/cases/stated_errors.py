@@ -46,24 +46,24 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     }
 
 
-def _make_samples(counts: dict[str, int]) -> list[list[Saved]]:
+def _make_samples(sample_counts: dict[str, int]) -> list[list[Saved]]:
     """Samples of each system, computed by at most two processes; by this process if there is only one system."""
-    if len(counts) == 1:
-        return [samples(name, count) for name, count in counts.items()]
+    if len(sample_counts) == 1:
+        return [samples(name, count) for name, count in sample_counts.items()]
     with process_pool(min(2, os.cpu_count() or 1)) as pool:
-        return list(pool.map(samples, counts, counts.values()))
+        return list(pool.map(samples, sample_counts, sample_counts.values()))
 
 
-def samples(name: str, count: int) -> list[Saved]:
+def samples(name: str, sample_count: int) -> list[Saved]:
     """Samples of a system in the form for JSON."""
-    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
+    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(sample_count, SEED)
     return [_sample_as_table(name, sample) for sample in drawn]
 
 
 def _sample_as_table(system: str, sample: Sample) -> Saved:
     """A sample in the form for JSON; ``ratio``: ratio of the true to the stated error, None where no number is
     stated."""
-    told = {
+    sample_table = {
         "system": system,
         "name": sample.name,
         "engine": sample.engine,
@@ -71,9 +71,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "ratio": None,
     }
     if not sample.told:
-        return told
+        return sample_table
     stated, true = sample.told[sample.printed], sample.true[sample.printed]
-    return told | {
+    return sample_table | {
         "channel": sample.printed,
         "stated": stated.error,
         "true": true,
@@ -85,9 +85,9 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
     }
 
 
-def ratio(true: float, stated: float) -> float:
+def ratio(true_error: float, stated: float) -> float:
     """Ratio of the true to the stated error."""
-    return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
+    return true_error / stated if stated > 0.0 else (0.0 if true_error == 0.0 else math.inf)
 
 
 def _rows(samples: list[Saved], quick: bool) -> list[Row]:
@@ -161,7 +161,7 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     """Rows on the stated errors of one system, reported."""
     of_system = [sample for sample in samples if sample["system"] == name]
     known = [sample for sample in of_system if sample["ratio"] is not None]
-    told = f"{name}, {len(known)} of {len(of_system)} samples"
+    sample_text = f"{name}, {len(known)} of {len(of_system)} samples"
     near = _share_of_true(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
     middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
@@ -171,7 +171,9 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
         ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), COST),
     )
     return [
-        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "").beside(expected, why, "none")
+        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(
+            expected, why, "none"
+        )
         for id, what, value, expected in shown
     ]
 

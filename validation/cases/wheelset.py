@@ -53,11 +53,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             _none_row("stiff", STIFF_WHEELSET, "stable"),
             *_fault_rows(),
         ]
-    kept = ("speed", "amplitude", "frequency", "error", "frequency_error")
+    orbit_fields = ("speed", "amplitude", "frequency", "error", "frequency_error")
     return rows, {
         "critical": speeds,
         "cycles": {
-            name: {engine: {key: float(getattr(orbit, key)) for key in kept} for engine, orbit in of_engine.items()}
+            name: {
+                engine: {key: float(getattr(orbit, key)) for key in orbit_fields} for engine, orbit in of_engine.items()
+            }
             for name, of_engine in cycles.items()
         },
     }
@@ -137,17 +139,17 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
 
 def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
     """Row: all implementations find no critical speed for a wheelset that has none."""
-    said = set()
+    outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
         try:
-            said.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
+            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth, implementation(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
-            said.add("unstable" if error.unstable else "stable")
+            outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
         f"wheelset.critical.{name}",
         SYSTEM,
         f"outcome of three implementations for a {name} wheelset at all speeds",
-        " or ".join(sorted(said)),
+        " or ".join(sorted(outcomes)),
         expected,
         "nothing holds it, or more than creep forces can drive",
     )
@@ -329,10 +331,10 @@ def _fault_rows() -> list[Row]:
     with faults.creep_law_patch(faults.spin_reversed)()():
         spin = largest_relative_difference(engine.rates(state), equations.rates(state))
     softer = CHOSEN_WHEELSET.changed(stiffness_x=0.99 * CHOSEN_WHEELSET.stiffness_x)
-    stiff, other = (
+    stiff, changed = (
         critical_speed(wheelset, partial(largest_growth, Equations)) for wheelset in (CHOSEN_WHEELSET, softer)
     )
-    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / stiff - 1.0) > 1e-6}
+    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(changed / stiff - 1.0) > 1e-6}
     return [
         behaviour_row(
             f"wheelset.fault.{name.split()[-1]}",

@@ -52,10 +52,11 @@ def _laws(states: int) -> list[Row]:
         )
     ]
     for name, car in rolling_cars().items():
-        held = preloads(car.vehicle)
+        preloads_of = preloads(car.vehicle)
         plain = held_at_rest(car.vehicle, CARRIER)
         gap = max(
-            largest_relative_difference(other, list(known.values())) for known, other in zip(held, plain, strict=True)
+            largest_relative_difference(other, list(known.values()))
+            for known, other in zip(preloads_of, plain, strict=True)
         )
         rows.append(
             _row(

@@ -122,12 +122,12 @@ def _contacts_patch(change: Callable[[Array], None]) -> Patch:
     """Patch that changes FASTSIM's input CONTACT (n,) in place."""
 
     def contacts(original: Any) -> Any:
-        def made(*given: Any) -> Any:
+        def planted(*given: Any) -> Any:
             answer, shape = original(*given)
             change(answer)
             return answer, shape
 
-        return made
+        return planted
 
     return attribute_patch("models.contact.fastsim:contacts_of", contacts)
 
@@ -139,9 +139,9 @@ def _multiplication_patch(name: str, factor: float) -> Patch:
     return _contacts_patch(change)
 
 
-def _exchange_patch(first: str, second: str) -> Patch:
+def _exchange_patch(first_field: str, second_field: str) -> Patch:
     def change(contacts: Array) -> None:
-        contacts[first], contacts[second] = contacts[second].copy(), contacts[first].copy()
+        contacts[first_field], contacts[second_field] = contacts[second_field].copy(), contacts[first_field].copy()
 
     return _contacts_patch(change)
 

@@ -51,8 +51,8 @@ def _error_ratios(fault: EngineFault, benches: list[Bench]) -> Saved:
         }
         for bench in benches
     }
-    place = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
-    return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
+    place_of_fault = next((name for name, group in FAULTS_BY_PLACE.items() if fault in group), "nowhere")
+    return {"fault": fault.name, "place": place_of_fault, "engines": fault.engines, "ratios": ratios}
 
 
 def _error_ratio(fault: EngineFault, engine: str, name: str, bench: Bench) -> float | None:
@@ -101,7 +101,9 @@ def rows(data: Saved) -> list[Row]:
         for ratio in ratios.values()
     )
     single = [record for record in faulty if sum(is_seen(record, name) for name in CHECKS) == 1]
-    told = [f"{record['fault']} ({next(name for name in CHECKS if is_seen(record, name))})" for record in single]
+    single_catches = [
+        f"{record['fault']} ({next(name for name in CHECKS if is_seen(record, name))})" for record in single
+    ]
     return [
         Observed(
             "planted.caught",
@@ -122,7 +124,9 @@ def rows(data: Saved) -> list[Row]:
         *([_hidden_faults_row(faulty)] if _has_symmetric_vehicle(data) else []),
         Observed(
             "planted.single", FAULT_SYSTEM, "planted faults that a single check catches", len(single), "faults"
-        ).beside("few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"),
+        ).beside(
+            "few", "what would pass if that check were dropped: " + (", ".join(single_catches) or "none"), "native"
+        ),
     ]
 
 
@@ -219,8 +223,14 @@ def _size_text(record: Saved, name: str) -> str:
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
         for engine, ratios in record["ratios"][ASYMMETRIC_SET].items()
     ]
-    least = min(sizes)
-    return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
+    smallest_error = min(sizes)
+    return (
+        "refused"
+        if smallest_error == math.inf
+        else f"{smallest_error:.0e}"
+        if smallest_error < 0.01
+        else f"{smallest_error:.2g}"
+    )
 
 
 def draw(data: Saved) -> Drawn:

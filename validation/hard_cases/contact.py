@@ -36,8 +36,8 @@ def next_to_none(implementation: str, folder: Path) -> float:
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
     motion = (small, -0.5 * small, 30.0 * small)
     answer, linear = fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR), forces(A, B, *motion, PAIR)
-    off = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
-    return float(np.abs(off).max())
+    relative_errors = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
+    return float(np.abs(relative_errors).max())
 
 
 def against(implementation: str, folder: Path) -> float:

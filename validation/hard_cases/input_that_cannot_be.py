@@ -68,10 +68,10 @@ def error_texts(change: Change) -> list[str]:
     )
     forces = np.ascontiguousarray(change(true_forces()))
     findings = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
-    errors = [each.text for each in findings if each.weight == "error"]
+    errors = [finding.text for finding in findings if finding.weight == "error"]
     if errors:
         raise InputError("forces.csv", "", None, " ".join(errors))
-    return [each.text for each in findings if each.weight == "doubt"]
+    return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
 def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:

@@ -35,11 +35,11 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
     """
     count = round(DURATION / PERIOD) + 1
     base = vehicle()
-    forces = static_forces(base, count, PERIOD, held=False).values
+    forces = static_forces(base, count, PERIOD, is_held=False).values
     write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
-    seen = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
-    seen[lost] = np.nan
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
+    measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
+    measured_pitch[lost] = np.nan
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, PERIOD)
     p, start = base.parameters, base.initial.copy()
     start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
     scene = build(
@@ -85,7 +85,7 @@ def certain_start(engine: str, folder: Path) -> float:
     stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
     base = vehicle()
-    forces = static_forces(base, count + 1, PERIOD, held=False)
+    forces = static_forces(base, count + 1, PERIOD, is_held=False)
     assembly = driven_by_forces(base, forces)
     assembly = replace(
         assembly,
@@ -93,15 +93,15 @@ def certain_start(engine: str, folder: Path) -> float:
             update={"run": assembly.scene.run.model_copy(update={"duration": count * PERIOD})}
         ),
     )
-    seen = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
-    estimated = estimate(assembly, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
+    measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
+    estimated = estimate(assembly, Measurement(measured_pitch, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
     P = estimated.errors()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
     values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))
     if not np.isfinite(values).all() or values.min() < -1e-6:
         return np.inf
-    off = estimated.states[1:, PITCH] - base.initial[3]
-    return float(np.abs(off / np.sqrt(P[1:, PITCH, PITCH])).max())
+    error_of_values = estimated.states[1:, PITCH] - base.initial[3]
+    return float(np.abs(error_of_values / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 
 def empty_column(engine: str, folder: Path) -> float:
@@ -132,10 +132,13 @@ def stiff_naive(folder: Path) -> str:
     """Without the remedy: this process noise by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
-    times, least = noise[2, 2] / (wanted @ wanted.T)[2, 2], np.linalg.eigvalsh((noise + noise.T) / 2).min()
+    variance_ratio, least_eigenvalue = (
+        noise[2, 2] / (wanted @ wanted.T)[2, 2],
+        np.linalg.eigvalsh((noise + noise.T) / 2).min(),
+    )
     return (
-        f"filterpy's van_loan_discretization gives a pitch variance {times:.1e} times the right one, and an "
-        f"eigenvalue of {least:.1e}, unwarned"
+        f"filterpy's van_loan_discretization gives a pitch variance {variance_ratio:.1e} times the right one, and an "
+        f"eigenvalue of {least_eigenvalue:.1e}, unwarned"
     )
 
 

@@ -52,9 +52,9 @@ def exactly(step: float = STEP, start: np.ndarray = FALLING_STATE, **override: f
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(start, "linear", override)
         states = setups.run(engine, assembly, step, LONGEST_DURATION).states
-        every = max(1, round(step / STEP))
-        exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(states) - 1))
-        return setups.largest_magnitude(states - exact[::every])
+        stride = max(1, round(step / STEP))
+        exact = Bounces(assembly, STEP if stride > 1 else step).path(assembly.initial, stride * (len(states) - 1))
+        return setups.largest_magnitude(states - exact[::stride])
 
     return error
 
@@ -113,9 +113,9 @@ def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) 
     return setups.largest_magnitude(states - exact) if air.any() else np.inf
 
 
-def _road_heights(road: Signal | None, step: float, count: int) -> np.ndarray:
+def _road_heights(road: Signal | None, step: float, sample_count: int) -> np.ndarray:
     """Road heights (m, down) under the front wheel."""
-    return np.zeros(count) if road is None else road.sample(0.0, step, count)[:, 0]
+    return np.zeros(sample_count) if road is None else road.sample(0.0, step, sample_count)[:, 0]
 
 
 def coarse_road(engine: str, folder: Path) -> float:
@@ -179,8 +179,8 @@ def linear_naive(folder: Path) -> str:
 def hard_naive(folder: Path) -> str:
     """Without the guard: a stable step that jumps over landings, without the check after the run."""
     with mock.patch.object(protocol, "check_resolved", lambda *_: None):
-        off = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
-    return f"stable, finite, a wheel's velocity off by {off:.2g} m/s"
+        velocity_error = exactly(2e-3, k1=2e7, k2=2e7)("reference", folder)
+    return f"stable, finite, a wheel's velocity off by {velocity_error:.2g} m/s"
 
 
 THROWN_REASON = "a corner of the force within a step costs its square"

@@ -39,17 +39,18 @@ def angle(t: np.ndarray) -> np.ndarray:
     return AMPLITUDE * np.sin(RATE * t + 1.0)
 
 
-def scene(period: float = PERIOD, noise: float = 0.0) -> Assembly:
-    """The vehicle under its weight with a prescribed pitch, sampled every ``period`` (s), with noise (rad) on the
-    samples."""
+def scene(sample_period: float = PERIOD, noise: float = 0.0) -> Assembly:
+    """The vehicle under its weight with a prescribed pitch, sampled every ``sample_period`` (s), with noise (rad) on
+    the samples.
+    """
     base = vehicle()
-    samples = angle(period * np.arange(round(DURATION / period) + 1))
+    samples = angle(sample_period * np.arange(round(DURATION / sample_period) + 1))
     samples = samples + noise * np.random.default_rng(5).standard_normal(len(samples))
-    return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, period))
+    return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, sample_period))
 
 
 def _weight_forces() -> Sampled:
-    return static_forces(vehicle(), 2, DURATION, held=False)
+    return static_forces(vehicle(), 2, DURATION, is_held=False)
 
 
 @cache
@@ -57,24 +58,24 @@ def _settled_state() -> np.ndarray:
     """State in which the fast suspension modes have decayed, so that only multipliers are compared."""
     base = vehicle()
     samples = angle(PERIOD * np.arange(-500, 2))
-    before = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, PERIOD))
-    return tight_solution(before, PERIOD, DURATION).states[-1]
+    unsettled = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, PERIOD))
+    return tight_solution(unsettled, PERIOD, DURATION).states[-1]
 
 
-def _settled_assembly(base: Assembly) -> Assembly:
-    base.initial[:] = _settled_state()
-    return base
+def _settled_assembly(base_assembly: Assembly) -> Assembly:
+    base_assembly.initial[:] = _settled_state()
+    return base_assembly
 
 
 @cache
-def solution(period: float = PERIOD, noise: float = 0.0) -> Trajectory:
+def solution(sample_period: float = PERIOD, noise: float = 0.0) -> Trajectory:
     """Solution in which the pitch is eliminated, by order 8 at a tolerance of 1e-12, with rows every 1 ms."""
-    return tight_solution(scene(period, noise), PERIOD, DURATION)
+    return tight_solution(scene(sample_period, noise), PERIOD, DURATION)
 
 
-def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
+def truth(sample_period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
     """True enforced moment (n,) in N m, from that solution."""
-    moment = solution(period, noise).moment
+    moment = solution(sample_period, noise).moment
     assert moment is not None
     return moment
 
@@ -86,8 +87,8 @@ def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
     it: 6 N m that shrink by 0.6 per step, which the enforced-moment case shows on its own.
     """
     assert path.moment is not None
-    every = (len(path.moment) - 1) // (len(exact_moment) - 1)
-    return root_mean_square((path.moment[::every] - exact_moment)[20:])
+    stride = (len(path.moment) - 1) // (len(exact_moment) - 1)
+    return root_mean_square((path.moment[::stride] - exact_moment)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
@@ -214,12 +215,12 @@ class StraightLinePitch:
         """Sampling period (s) of the prescribed pitch."""
         return self.period
 
-    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
         """Angle, rate and 0 (for the second derivative) at start + i step."""
-        place = np.round((start + step * np.arange(count)) / self.period, 9)
-        index = np.minimum(place.astype(int), len(self.angles) - 2)
+        position = np.round((start + step * np.arange(sample_count)) / self.period, 9)
+        index = np.minimum(position.astype(int), len(self.angles) - 2)
         slope = np.diff(self.angles)[index]
-        return np.column_stack([self.angles[index] + (place - index) * slope, slope / self.period, 0 * slope])
+        return np.column_stack([self.angles[index] + (position - index) * slope, slope / self.period, 0 * slope])
 
     def at(self, time: float) -> np.ndarray:
         """The straight line's values at one time."""
@@ -258,16 +259,16 @@ def explicit_naive(folder: Path) -> str:
     """Without the guard: Exudyn's explicit solver with a constraint, check bypassed."""
     path = as_it_comes(scene(), 1e-3, "RK44")
     assert path.moment is not None
-    off = largest_magnitude(path.states[:, 3] - angle(path.times))
+    pitch_error = largest_magnitude(path.states[:, 3] - angle(path.times))
     moment = largest_magnitude(path.moment[1:])
-    return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
+    return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {pitch_error:.3f} rad"
 
 
 def fed_back(engine: str, folder: Path) -> float:
     """Case: the pitch of a free run is prescribed. Error: rms of the enforced moment, which should be 0, divided by
     that of the inertia moment."""
     base = vehicle("asymmetric_twin")
-    forces: Signal = static_forces(base, 2, DURATION, held=False)
+    forces: Signal = static_forces(base, 2, DURATION, is_held=False)
     base.initial[3] += 0.05
     free = tight_solution(driven_by_forces(base, forces), 2.5e-4, DURATION).states
     guided = setups.guided_vehicle(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
@@ -291,8 +292,8 @@ def gap_naive(folder: Path) -> str:
     assembly = scene()
     path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None
-    off = largest_magnitude(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
-    return f"Exudyn enforces the angle alone: its rate is off by {off:.1e} rad/s"
+    rate_error = largest_magnitude(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
+    return f"Exudyn enforces the angle alone: its rate is off by {rate_error:.1e} rad/s"
 
 
 NO_RADIUS = "Exudyn alone has the setting; the others eliminate the pitch"

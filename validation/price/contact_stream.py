@@ -44,20 +44,20 @@ def write(path: Path, rows: int) -> None:
 def answered(folder: Path, rows: int) -> ProcessCost:
     """Compute a table of ``rows`` contacts into ``forces.csv``, without errors and with few cells."""
     write(folder / "cases.csv", rows)
-    begun = time.perf_counter()
+    start_time = time.perf_counter()
     counts = answer_table(
         folder / "cases.csv", folder / "forces.csv", partial(Built, MaterialPair()), Method(cells=5), errors=False
     )
     if counts != {"rows": rows, "wrong": 0}:
         raise AssertionError(f"{counts} in place of {rows} sound rows")
-    return ProcessCost(peak_memory(), time.perf_counter() - begun)
+    return ProcessCost(peak_memory(), time.perf_counter() - start_time)
 
 
 def in_fresh_process(function: Callable[[Path, int], ProcessCost], rows: int) -> ProcessCost:
     """Result of function(folder, rows) in a process of its own."""
     with TemporaryDirectory() as name, process_pool(1) as executor:
-        taken: ProcessCost = executor.submit(function, Path(name), rows).result()
-        return taken
+        process_cost: ProcessCost = executor.submit(function, Path(name), rows).result()
+        return process_cost
 
 
 if __name__ == "__main__":

@@ -39,13 +39,13 @@ Asked = tuple[dict[str, Any], list[str]]
 """Tables of a scene, and the quantities that may be asked about."""
 
 
-def drawn_scene_of_system(system: str, number: int) -> DrawnScene:
+def drawn_scene_of_system(system: str, scene_number: int) -> DrawnScene:
     """A random scene of a system for a number, with a quantity and a tolerance."""
-    rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
+    rng = np.random.Generator(np.random.Philox(key=[SEED, scene_number]))
     table, quantities = {"wheelset": _random_wheelset, "handling": _random_handling, "braking": _random_braking}[
         system
     ](rng)
-    table |= {"title": f"{system} {number}", "system": system}
+    table |= {"title": f"{system} {scene_number}", "system": system}
     quantity = str(rng.choice(quantities))
     low, high = np.log(TOLERANCE_RANGES[quantity])
     scene = import_module(SYSTEMS[system].scene).build(table, "", Path())

@@ -90,13 +90,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
     return rows
 
 
-def _engine_difference_row(id: str, what: str, runs: dict[str, Ride]) -> Row:
-    first, other = (runs[engine].run for engine in ENGINES)
-    gap = max(np.abs(first.positions - other.positions).max(), np.abs(first.rates - other.rates).max())
+def _engine_difference_row(id: str, run_description: str, runs: dict[str, Ride]) -> Row:
+    first, other_run = (runs[engine].run for engine in ENGINES)
+    gap = max(np.abs(first.positions - other_run.positions).max(), np.abs(first.rates - other_run.rates).max())
     return Observed(
         f"ride_nonlinear.path.{id}",
         SYSTEM,
-        f"largest difference of all states between Exudyn and MuJoCo, {what} on the same random road",
+        f"largest difference of all states between Exudyn and MuJoCo, {run_description} on the same random road",
         float(gap),
         "m, rad, m/s, rad/s",
     ).at_most(1e-12, SAME_LAWS, "native")

@@ -87,11 +87,13 @@ class ForceExcited:
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.assembly = self.driven()
-        other = Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
+        other_settings = (
+            Settings("RK4", 2 * FINE_STEP, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
+        )
         self.reference = f"RK4 at {1e6 * FINE_STEP:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
         self._true, check = (
             self._sampled(build("reference", self.assembly, settings).run())
-            for settings in (Settings("RK4", FINE_STEP, DURATION), other)
+            for settings in (Settings("RK4", FINE_STEP, DURATION), other_settings)
         )
         self.uncertainty = largest_differences(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
@@ -106,8 +108,8 @@ class ForceExcited:
 
     def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
         """The compared quantities at the force samples."""
-        every = (len(run.states) - 1) // round(DURATION / PERIOD)
-        return {name: values[::every] for name, values in self.read(run).items()}
+        stride = (len(run.states) - 1) // round(DURATION / PERIOD)
+        return {name: values[::stride] for name, values in self.read(run).items()}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """All settings, or their named share."""

@@ -95,7 +95,7 @@ class FreeVehicle:
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
         self.instants = GRID * np.arange(round(DURATION / GRID) + 1)
-        self.reference = " and ".join(f"{what} by {method} at {tol:g}" for method, tol, what in REFERENCES)
+        self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCES)
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
@@ -136,8 +136,8 @@ class FreeVehicle:
         (m, 2 n)."""
         road = self.road(times)
         n = states.shape[1] // 2
-        given = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
-        motion = np.column_stack([given, states[:, n:], states[:, :n], road])
+        accelerations = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
+        motion = np.column_stack([accelerations, states[:, n:], states[:, :n], road])
         return {
             name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
             for name, kind in KINDS.items()
@@ -157,15 +157,15 @@ class FreeVehicle:
     def build(self, setting: Setting) -> FreeVehicleSolver:
         """The vehicle in one engine."""
         settings = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
-        times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
-        model = build(setting.engine, self.vehicle, settings, SPEED, self.road(times))
-        rest = np.zeros(len(self.vehicle.coordinates()))
-        return FreeVehicleSolver(partial(model.run, rest, rest))
+        half_step_times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
+        model = build(setting.engine, self.vehicle, settings, SPEED, self.road(half_step_times))
+        rest_state = np.zeros(len(self.vehicle.coordinates()))
+        return FreeVehicleSolver(partial(model.run, rest_state, rest_state))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of any wheel load and of any acceleration at the compared instants."""
-        every = round(GRID / (solution.times[1] - solution.times[0]))
-        states = np.hstack([solution.positions, solution.rates])[::every]
+        stride = round(GRID / (solution.times[1] - solution.times[0]))
+        states = np.hstack([solution.positions, solution.rates])[::stride]
         return largest_differences(self.read(states, self.instants), self._true)
 
 

@@ -23,9 +23,9 @@ LEAST_CELLS, LARGEST_CELLS = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 """Cells along each axis."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random scenes; scenes that are refused are replaced by others."""
-    return drawn_samples(count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random scenes; scenes that are refused are replaced by others."""
+    return drawn_samples(sample_count, seed, lambda random: _sample_of_contact(_draw_scene(random)))
 
 
 def _draw_scene(rng: np.random.Generator) -> ContactScene:
@@ -55,8 +55,8 @@ def _draw_scene(rng: np.random.Generator) -> ContactScene:
 def _sample_of_contact(scene: ContactScene) -> Sample:
     run_ = run(scene, error=True)
     body, motions, cells = run_.detail.contact, run_.detail.motions, scene.method.cells
-    most = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
-    truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most)) for motion in motions])
+    most_cells = OF_EXACT if scene.method.name == "exact" else MOST_CELLS
+    truth = np.array([_forces_of_motion(body, motion, min(FINER_CELLS * cells, most_cells)) for motion in motions])
     gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
     true = {"force": finite_rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": finite_rms(gap[:, 2])}
     power = CELL_POWER[scene.method.name] or 0

@@ -30,10 +30,10 @@ SAMPLING_PERIODS = (1e-3, 2e-3, 5e-3)
 """Sampling periods (s) of wheel forces and pitch."""
 
 
-def samples(count: int, seed: int) -> Iterator[Sample]:
-    """``count`` samples from random runs; scenes that an engine refuses are replaced by others."""
+def samples(sample_count: int, seed: int) -> Iterator[Sample]:
+    """``sample_count`` samples from random runs; scenes that an engine refuses are replaced by others."""
     with TemporaryDirectory() as folder:
-        yield from drawn_samples(count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
+        yield from drawn_samples(sample_count, [seed, 1], lambda random: _sample_of_run(random, Path(folder)))
 
 
 def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
@@ -45,12 +45,12 @@ def _sample_of_run(random: np.random.Generator, folder: Path) -> Sample:
     with _count_force_calls() as calls:
         run = _run(scene, engine)
     truth = _reference_run(scene, engine)
-    told = errors_of(run)
-    true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in told}
+    estimates = errors_of(run)
+    true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in estimates}
     settings = settings_of(scene, engine)
     fine = f"tolerance {settings.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{settings.step:.3g} s"
-    what = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
-    return Sample(what, engine, told, true, calls[0], sum(calls[1:]))
+    sample_name = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
+    return Sample(sample_name, engine, estimates, true, calls[0], sum(calls[1:]))
 
 
 def _run(scene: Scene, engine: str) -> Result:
@@ -167,9 +167,9 @@ def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> di
     )
     measured = measure(on_road)
     write_measurement(measured, folder, period)
-    every = round(period / 2e-4)
-    both = {"z3": ("m", measured["z3"][::every]), "pitch": ("rad", measured["pitch"][::every])}
-    write_time_series(folder / "both.csv", both, period)
+    stride = round(period / 2e-4)
+    both_columns = {"z3": ("m", measured["z3"][::stride]), "pitch": ("rad", measured["pitch"][::stride])}
+    write_time_series(folder / "both.csv", both_columns, period)
     table["period"] = period
     rule = str(rng.choice(["held", "linear", "smooth"]))
     forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(rng.choice(["inertial", "body"]))}
@@ -185,10 +185,10 @@ def _forces(rng: np.random.Generator, folder: Path, table: dict[str, Any]) -> di
     return {"wheel_forces": forces, **noise, **holds[int(rng.integers(len(holds)))]}
 
 
-def _step(rng: np.random.Generator, duration: float, period: float | None) -> float:
+def _step(rng: np.random.Generator, duration: float, sample_period: float | None) -> float:
     """A random step from 20 microseconds to 8 ms that divides the duration and the period."""
     wanted = float(np.exp(rng.uniform(np.log(2e-5), np.log(8e-3))))
-    whole = duration if period is None else period
-    step = whole / max(1, round(whole / wanted))
+    divided_time = duration if sample_period is None else sample_period
+    step = divided_time / max(1, round(divided_time / wanted))
     assert divides(step, duration)
     return step
