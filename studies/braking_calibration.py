@@ -110,13 +110,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def fitted_scene(scene: BrakingScene, options: Options, scale: float, steer: float) -> BrakingScene:
+def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, steer: float) -> BrakingScene:
     """The scene with another friction and steer angle; raises RunFailed if the fit has left the possible range of
     these."""
-    if not (0.05 < scale < 2.0 and steer < 1.0):
-        raise RunFailed("calibration", f"the fit diverges: friction times {scale:.3g}, steer angle {steer:.3g} rad")
+    if not (0.05 < friction_scale < 2.0 and steer < 1.0):
+        raise RunFailed(
+            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer:.3g} rad"
+        )
     procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
-    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: scale}})
+    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: friction_scale}})
     return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
 
 
@@ -135,10 +137,10 @@ def _means_of_stops(
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
+def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
     """Lines with the fitted parameters, and with each figure next to the paper's value."""
     lines = [
-        f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
+        f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",
         f"  means of {options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]

@@ -274,10 +274,10 @@ def _save_effect_table(choice: SceneChoice, path: Path) -> None:
             )
 
 
-def percent_text(value: float) -> str:
+def percent_text(relative_change: float) -> str:
     """A relative change as text."""
-    digits = ".2g" if abs(value) < 0.1 else ",.0f"
-    return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
+    digits = ".2g" if abs(relative_change) < 0.1 else ",.0f"
+    return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
 def _change_text(relative_change: float, beside: float) -> str:

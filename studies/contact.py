@@ -93,8 +93,8 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(error: Error, limit: float) -> str:
-    cells, theory = (_percent_text(error_part, limit) for error_part in (error.cells, error.theory))
+def _errors_text(error: Error, friction_limit: float) -> str:
+    cells, theory = (_percent_text(error_part, friction_limit) for error_part in (error.cells, error.theory))
     return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
 
 
@@ -111,8 +111,8 @@ def theory_text(method: Method) -> str:
     return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
 
 
-def _percent_text(error: float, limit: float) -> str:
-    return f"{100 * error / limit:.2f}" if limit > 0 else "0"
+def _percent_text(error: float, friction_limit: float) -> str:
+    return f"{100 * error / friction_limit:.2f}" if friction_limit > 0 else "0"
 
 
 def _lines_of_touches(scene: ContactScene) -> list[str]:

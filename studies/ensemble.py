@@ -227,8 +227,8 @@ def text(
     return lines
 
 
-def _time_text(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "never"
+def _time_text(seconds: float) -> str:
+    return f"{seconds:.2f}" if np.isfinite(seconds) else "never"
 
 
 def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:

@@ -214,17 +214,17 @@ def _value_without_rounding(deviations: np.ndarray) -> float:
     return float(deviations[0]) if deviations[0] > max(NEGLIGIBLE_OUTPUT * largest, ROUNDING_DEVIATION) else 0.0
 
 
-def _text(value: float, unit: str, status: str) -> str:
+def _text(deviation: float, unit: str, status: str) -> str:
     """Text of a standard deviation with its unit (mm for lengths), or its status if it is not finite."""
     if status != "finite":
         return status
-    return f"{1e3 * value:.3g} mm" if unit == "m" else f"{value:.4g} {unit}"
+    return f"{1e3 * deviation:.3g} mm" if unit == "m" else f"{deviation:.4g} {unit}"
 
 
-def _change_text(other_value: float, value: float) -> str:
+def _change_text(other_value: float, deviation: float) -> str:
     return (
-        f"{100 * (other_value / value - 1):+.1f} %"
-        if np.isfinite(other_value) and NEGLIGIBLE_OUTPUT * other_value < value < np.inf
+        f"{100 * (other_value / deviation - 1):+.1f} %"
+        if np.isfinite(other_value) and NEGLIGIBLE_OUTPUT * other_value < deviation < np.inf
         else "-"
     )
 

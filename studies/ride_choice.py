@@ -236,10 +236,10 @@ def _plot_activity(axis: Any, watts: dict[str, float]) -> None:
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 
 
-def percent_text(value: float) -> str:
+def percent_text(relative_change: float) -> str:
     """A relative change as text, in per cent."""
-    digits = "+.2g" if abs(value) < 0.1 else "+,.0f"
-    return f"{100 * value:{digits}} %" if np.isfinite(value) else "without end"
+    digits = "+.2g" if abs(relative_change) < 0.1 else "+,.0f"
+    return f"{100 * relative_change:{digits}} %" if np.isfinite(relative_change) else "without end"
 
 
 def _table(

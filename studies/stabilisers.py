@@ -109,9 +109,17 @@ def _line(row: Row, free: float) -> str:
     )
 
 
-def _ratio_text(value: float | None) -> str:
+def _ratio_text(damage_ratio: float | None) -> str:
     """Text of a damage ratio in at most six characters; "-" for a tumbled run, which has none."""
-    return "-" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}" if value < 1e3 else f"{value:.0e}"
+    return (
+        "-"
+        if damage_ratio is None
+        else f"{damage_ratio:.3f}"
+        if damage_ratio < 10
+        else f"{damage_ratio:.1f}"
+        if damage_ratio < 1e3
+        else f"{damage_ratio:.0e}"
+    )
 
 
 if __name__ == "__main__":

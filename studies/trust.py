@@ -154,29 +154,29 @@ def _ensemble_of_paths(
     return {"times": row_times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _with_errors(result: Result, quiet_run: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+def _with_errors(result: Result, quiet_run: Result, drift_off_times: dict[str, np.ndarray], options: Options) -> Result:
     """The result with two errors: the step error, estimated on the run without noise, and the standard error of the
     median."""
     result.data.attrs["error"] = quiet_run.data.attrs["error"]
     with_assumptions(result, [small_errors(options.angle)])
-    middle, low, high = quantile_with_interval(spread["drift_off"], 0.5)
+    middle, low, high = quantile_with_interval(drift_off_times["drift_off"], 0.5)
     if not math.isfinite(high):
         return result
     error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
     return of_chance(result, {"median drift-off by noise": error}, options.paths)
 
 
-def _saved_paths(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
+def _saved_paths(scene: Scene, rows: list[Row], drift_off_times: dict[str, np.ndarray]) -> Result:
     """Channels of the drift-off times by source, and of the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
         for name in ("predicted", "measured")
     }
     paths = {
-        "drift_off": Channel("path", spread["drift_off"], "s", "drift-off, infinite if never"),
-        "error": Channel(("path", "time"), spread["errors"], "rad", "pitch error"),
+        "drift_off": Channel("path", drift_off_times["drift_off"], "s", "drift-off, infinite if never"),
+        "error": Channel(("path", "time"), drift_off_times["errors"], "rad", "pitch error"),
     }
-    axes = {"source": Channel("source", list(SOURCE_NAMES)), "time": Channel("time", spread["times"], "s")}
+    axes = {"source": Channel("source", list(SOURCE_NAMES)), "time": Channel("time", drift_off_times["times"], "s")}
     return result(scene, drift_off | paths, axes)
 
 
@@ -283,7 +283,7 @@ def _size_at_time(curve: GrowthCurve, options: Options, rate: float) -> float:
 def _figure(
     curves: dict[str, GrowthCurve],
     runs: dict[str, GrowthCurve],
-    spread: dict[str, np.ndarray],
+    drift_off_times: dict[str, np.ndarray],
     options: Options,
     results: Results,
     path: Path,
@@ -294,9 +294,9 @@ def _figure(
 
     colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.8))
-    axis.semilogy(spread["times"], spread["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
-    middle = np.median(spread["errors"], axis=0)
-    axis.semilogy(spread["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")
+    axis.semilogy(drift_off_times["times"], drift_off_times["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
+    middle = np.median(drift_off_times["errors"], axis=0)
+    axis.semilogy(drift_off_times["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")
     for name, curve in runs.items():
         axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
     for name, curve in curves.items():

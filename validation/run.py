@@ -245,12 +245,12 @@ def seeds_of_rows() -> dict[str, int]:
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
-def save(folder: Path, rows: list[Row], source: Saved, earlier_report: Saved | None = None) -> None:
+def save(folder: Path, rows: list[Row], report_source: Saved, earlier_report: Saved | None = None) -> None:
     """Write results.json and results.csv, and print what changed since an earlier report."""
     table = [row.as_dict() for row in rows]
-    content: Saved = {"provenance": source, "rows": table}
+    content: Saved = {"provenance": report_source, "rows": table}
     if earlier_report is not None:
-        content["against"] = comparison_with_earlier(earlier_report, table, source)
+        content["against"] = comparison_with_earlier(earlier_report, table, report_source)
         print("\n".join(change_lines(content["against"])))
     write_whole(folder / "results.json", json.dumps(content, indent=1).encode())
     with whole_file(folder / "results.csv") as partial_path, partial_path.open("w", newline="") as file:

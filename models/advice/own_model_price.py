@@ -111,20 +111,20 @@ class PricedModel:
         calls = steps * CALLS_PER_STEP.get(setting.method, 1)
         return setting.value * np.arange(steps + 1), path, calls
 
-    def _path(self, setting: Setting, start: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
+    def _path(self, setting: Setting, start_state: tuple[np.ndarray, np.ndarray], steps: int) -> np.ndarray:
         """Values (steps + 1, k) of the quantity along a run."""
         twin, step = self.twin, setting.value
         if setting.engine == "mujoco":
-            states = file_path(twin, start, (steps, step), setting.method)
+            states = file_path(twin, start_state, (steps, step), setting.method)
             return twin.coordinates.positions(states)[:, self.columns]
         if setting.engine == "exudyn":
             from models.engines.free_vehicle_exudyn import FreeExudyn
 
-            path: np.ndarray = FreeExudyn(twin.driven).march(*start, steps, step, setting.method)[:, self.columns]
+            path: np.ndarray = FreeExudyn(twin.driven).march(*start_state, steps, step, setting.method)[:, self.columns]
             return path
-        return self._exact(start, steps, step)
+        return self._exact(start_state, steps, step)
 
-    def _exact(self, start: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
+    def _exact(self, start_state: tuple[np.ndarray, np.ndarray], steps: int, step: float) -> np.ndarray:
         tree, n = plain_tree(self.twin), self.twin.size
 
         def rates(t: float, state: np.ndarray) -> np.ndarray:
@@ -135,7 +135,7 @@ class PricedModel:
         solved = solve_ivp(
             rates,
             span,
-            np.concatenate(start),
+            np.concatenate(start_state),
             REFERENCE_METHOD,
             rows,
             dense_output=True,

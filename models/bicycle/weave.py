@@ -57,10 +57,14 @@ def decaying_sinusoid(values: np.ndarray, rate: float = SAMPLING_RATE) -> comple
     squares; w is above 0."""
     times = np.arange(len(values)) / rate
 
-    def left(shape: np.ndarray) -> np.ndarray:
-        swing = np.exp(shape[0] * times)
+    def left(decay_and_frequency: np.ndarray) -> np.ndarray:
+        swing = np.exp(decay_and_frequency[0] * times)
         basis = np.column_stack(
-            [swing * np.cos(shape[1] * times), swing * np.sin(shape[1] * times), np.ones_like(times)]
+            [
+                swing * np.cos(decay_and_frequency[1] * times),
+                swing * np.sin(decay_and_frequency[1] * times),
+                np.ones_like(times),
+            ]
         )
         return np.asarray(values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0])
 

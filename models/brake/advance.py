@@ -42,14 +42,15 @@ def end_status(motion, plane):
 
 
 @inlined
-def parts_of(state, regular):
-    """Number of equal parts into which to cut a step, so that the speed ``regular`` (m/s) falls below the vehicle's
-    speed.
+def parts_of(state, regularising_speed):
+    """Number of equal parts into which to cut a step, so that the speed ``regularising_speed`` (m/s) falls below the
+    vehicle's speed.
 
-    Slip angles are too small below ``regular``: the vehicle would slip sideways, and yaw on split friction, too far.
+    Slip angles are too small below ``regularising_speed``: the vehicle would slip sideways, and yaw on split friction,
+    too far.
     """
     speed = math.hypot(state[1, 0], state[1, 1])
-    return 1 if speed == 0.0 else int(min(math.ceil(regular / speed), MOST_PARTS))
+    return 1 if speed == 0.0 else int(min(math.ceil(regularising_speed / speed), MOST_PARTS))
 
 
 @lean

@@ -48,14 +48,14 @@ def scalar_product(row, vector):
 
 
 @inlined
-def moved_to(row, target):
-    """Copy the row's numbers into ``target``; array assignment would allocate a temporary array."""
+def moved_to(row, target_row):
+    """Copy the row's numbers into ``target_row``; array assignment would allocate a temporary array."""
     for a in range(row.size):
-        target[a] = row[a]
+        target_row[a] = row[a]
 
 
 @inlined
-def settle(motion, steer, regular, starts, vehicle, frame):
+def settle(motion, steer, regularising_speed, starts, vehicle, frame):
     """Fill wheel quantities and equations of motion that follow from the state. With ``starts``, the state is that at
     the start of the step, and the wheels' steer angles and speeds along them are stored."""
     plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
@@ -84,7 +84,7 @@ def settle(motion, steer, regular, starts, vehicle, frame):
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
-        slide(i, u, v, regular, frame.surfaces.lag, angles, wheels)
+        slide(i, u, v, regularising_speed, frame.surfaces.lag, angles, wheels)
     inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
     for a in range(count_of_prescribed(plane), coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
@@ -93,13 +93,13 @@ def settle(motion, steer, regular, starts, vehicle, frame):
 
 
 @inlined
-def slide(i, u, v, regular, lag, angles, wheels):
+def slide(i, u, v, regularising_speed, lag, angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
     Where ``lag`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v."""
     forwards = u if wheels.start[i] >= 0.0 else -u
     if not math.isnan(lag[i]):
-        v = lag[i] * max(forwards, regular)
-    angle = math.atan2(abs(v), max(forwards, regular))
+        v = lag[i] * max(forwards, regularising_speed)
+    angle = math.atan2(abs(v), max(forwards, regularising_speed))
     wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), v, angle
     wheels.cell[i], wheels.share[i] = cell_and_share(angles, angle)
 
@@ -284,7 +284,7 @@ def by_means(motion, torques_before, torques_after, step, vehicle, frame):
 
 
 @inlined
-def comes_to_rest(rates, turning, accelerations, step, plane):
+def comes_to_rest(rates, wheel_turning, accelerations, step, plane):
     """Time (s) within the step at which the vehicle comes to rest, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
@@ -298,7 +298,7 @@ def comes_to_rest(rates, turning, accelerations, step, plane):
         speed += weight * rates[a] ** 2
         power += weight * rates[a] * accelerations[a]
         rate += weight * accelerations[a] ** 2
-    if speed == 0.0 and not turning.any():
+    if speed == 0.0 and not wheel_turning.any():
         return 0.0
     if rate == 0.0 or power >= 0.0 or -power > step * rate or speed > 2.25 * step * step * rate:
         return -1.0
@@ -306,12 +306,12 @@ def comes_to_rest(rates, turning, accelerations, step, plane):
 
 
 @lean
-def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
+def step_on(motion, torques, step, steer, regularising_speed, vehicle, surfaces):
     """One step of a ``Motion`` whose wheels are on ``Surfaces``.
 
-    torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad); regular :
-    m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does not, -1 if the loads
-    were not found.
+    torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad);
+    regularising_speed : m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does
+    not, -1 if the loads were not found.
     """
     plane, state, turning, accelerations = vehicle.plane, motion.state, motion.turning, motion.accelerations
     count, size = turning.size, coordinates(plane)
@@ -338,7 +338,7 @@ def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
     for i in range(count):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     for half in (True, False):
-        settle(motion, steer, regular, half, vehicle, frame)
+        settle(motion, steer, regularising_speed, half, vehicle, frame)
         time, end_torques = (0.5 * step, middle) if half else (step, torques[1])
         most_rounds = HALF_ROUNDS if half else ANDERSON_ROUNDS
         if not stage(motion, torques[0], end_torques, time, most_rounds, vehicle, frame) <= (

@@ -72,11 +72,11 @@ class Plane(NamedTuple):
         return self.unit.size
 
 
-def plane_of_truck(vehicle: Truck, transfer: bool = True) -> Plane:
-    """``Plane`` of a two-axle vehicle; without ``transfer`` its wheel loads stay as they are at rest."""
+def plane_of_truck(vehicle: Truck, with_load_transfer: bool = True) -> Plane:
+    """``Plane`` of a two-axle vehicle; without ``with_load_transfer`` its wheel loads stay as they are at rest."""
     check_wheels(vehicle, vehicle.mass)
     zeros = np.zeros(4, dtype=np.int64)
-    wheel_positions, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
+    wheel_positions, radius, spin, static, by_x, by_y = wheels(vehicle, with_load_transfer)
     return Plane(
         np.array([vehicle.mass]),
         np.array([vehicle.yaw_inertia]),
@@ -102,13 +102,13 @@ def check_wheels(vehicle: Truck, mass: float) -> None:
         raise InputError("", "mass", mass, allowed)
 
 
-def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
+def wheels(vehicle: Truck, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
     """Fields place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the four wheels of a two-axle
     body."""
     if not vehicle.front.x > 0.0 > vehicle.rear.x:
         raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
     shares = vehicle.front.roll_share + vehicle.rear.roll_share
-    if transfer and abs(shares - 1.0) > 1e-9:
+    if with_load_transfer and abs(shares - 1.0) > 1e-9:
         raise InputError("", "roll_share", shares, "of both axles must add up to 1")
     front, rear, side = vehicle.front, vehicle.rear, np.array([1.0, -1.0, 1.0, -1.0])
 
@@ -121,7 +121,14 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
     roll = -side * by_wheel("roll_share") * vehicle.mass * vehicle.height / by_wheel("track")
     wheel_positions = np.column_stack((by_wheel("x"), side * by_wheel("track") / 2.0))
     static = vehicle.mass * GRAVITY * share / 2.0
-    return wheel_positions, by_wheel("radius"), by_wheel("spin_inertia"), static, pitch * transfer, roll * transfer
+    return (
+        wheel_positions,
+        by_wheel("radius"),
+        by_wheel("spin_inertia"),
+        static,
+        pitch * with_load_transfer,
+        roll * with_load_transfer,
+    )
 
 
 PAPER_TRUCK = Truck(

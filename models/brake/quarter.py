@@ -122,17 +122,17 @@ def braked(
     torques: np.ndarray,
     step: float,
     speed: float,
-    turning: float | None = None,
+    rim_turning: float | None = None,
 ) -> QuarterStop:
     """Straight braking from a speed (m/s) under torques (n + 1,) in N m at the steps' ends (s), linear between.
 
-    turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
+    rim_turning : rad/s at the start, that of rolling if not given. Raises InputError for a torque below 0 or no number.
     """
     if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
         raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
     state, path = np.zeros((2, 3)), QuarterPath(*np.zeros((5, torques.size)))
     state[1, 0] = speed
-    spin = np.array([speed / quarter.radius if turning is None else turning])
+    spin = np.array([speed / quarter.radius if rim_turning is None else rim_turning])
     path.speed[0], path.turning[0] = speed, spin[0]
     vehicle = OnRoad(quarter.plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
     ends = np.ascontiguousarray(torques, dtype=float)[:, None]

@@ -78,12 +78,12 @@ class Sprung:
             [known.index(coordinate) for coordinate in hitch_coordinates if coordinate in known], dtype=np.int64
         )
 
-    def in_plane(self, transfer: bool = True) -> Plane:
+    def in_plane(self, with_load_transfer: bool = True) -> Plane:
         """``Plane`` of the vehicle and its wheels. In a train, loads are the static ones that its springs carry.
 
         Each hitch is taken to lie in the middle plane of the towing unit.
         """
-        plane, free = plane_of_truck(self.plane, transfer), self.handling.vehicle
+        plane, free = plane_of_truck(self.plane, with_load_transfer), self.handling.vehicle
         if not free.towed:
             return plane
         units = [_unit(free, name) for name in (None, *free.towed)]

@@ -144,11 +144,12 @@ def set_held(block, t, n):
 
 
 @lean
-def meet(contacts, regular, lag, angles, wheels):
-    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag (W,)
-    of ``Surfaces``; angles of the tyres' tables."""
+def meet(contacts, regularising_speed, lag, angles, wheels):
+    """Set slip angles and loads of the ``Wheels`` from their ``Contacts``; regularising_speed (m/s) : see
+    ``plane_step``; lag (W,) of ``Surfaces``; angles of the tyres' tables.
+    """
     for i in range(contacts.load.size):
-        slide(i, contacts.along[i], contacts.across[i], regular, lag, angles, wheels)
+        slide(i, contacts.along[i], contacts.across[i], regularising_speed, lag, angles, wheels)
         wheels.load[i] = contacts.load[i]
 
 
@@ -190,12 +191,12 @@ class Units(NamedTuple):
 
 
 @lean
-def to_units(coordinate_values, turns, plane):
+def to_units(coordinate_values, hinge_columns, plane):
     """Fill values (2 + U,) of the ``Units`` from values of all coordinates (n,): positions, rates or accelerations."""
     for a in range(PLANE):
         plane[a] = coordinate_values[a]
-    for k in range(turns.size):
-        plane[PLANE + k] = plane[PLANE + k - 1] + coordinate_values[turns[k]]
+    for k in range(hinge_columns.size):
+        plane[PLANE + k] = plane[PLANE + k - 1] + coordinate_values[hinge_columns[k]]
 
 
 @inlined

@@ -39,20 +39,28 @@ class Trailer(Truck):
     )
 
 
-def plane_of_trailer(trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_trailer(trailer: Trailer, with_load_transfer: bool = True) -> Plane:
     """``Plane`` of a trailer whose hook has a prescribed motion; the hook's position is the first two coordinates."""
     reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
-    parts: list[Any] = [*_units_of_train(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
+    parts: list[Any] = [
+        *_units_of_train(trailer),
+        reach,
+        *_wheels(trailer, 0, with_load_transfer),
+        1,
+        trailer.fold,
+        np.arange(2),
+    ]
     return Plane(*parts)
 
 
-def plane_of_train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
+def plane_of_train(vehicle: Truck, trailer: Trailer, with_load_transfer: bool = True) -> Plane:
     """``Plane`` of a truck with a trailer on its hook: eight wheels."""
-    truck_records, reach = plane_of_truck(vehicle, transfer), np.zeros((3, 3))
+    truck_records, reach = plane_of_truck(vehicle, with_load_transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
     units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units_of_train(trailer), strict=True))
     wheel_fields = (
-        np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True)
+        np.concatenate((a, b))
+        for a, b in zip(truck_records[3:11], _wheels(trailer, 1, with_load_transfer), strict=True)
     )
     parts: list[Any] = [*units, reach, *wheel_fields, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
@@ -62,11 +70,11 @@ def _units_of_train(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
     return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
 
 
-def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
+def _wheels(trailer: Trailer, first: int, with_load_transfer: bool) -> tuple[np.ndarray, ...]:
     """Unit and group of each wheel, then the results of ``wheels``; the front wheels belong to the drawbar, which is
     unit ``first``."""
     check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
-    wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
+    wheel_positions, radius, spin, static, by_x, by_y = wheels(trailer, with_load_transfer)
     wheel_positions[:2, 0] = 0.0
     static[:2] += trailer.drawbar_mass * GRAVITY / 2.0
     unit = np.array([first, first, first + 1, first + 1])

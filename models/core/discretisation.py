@@ -153,16 +153,16 @@ def estimated(
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
-    sizes: Mapping[str, float] | None = None,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result with estimated errors of the channels in ``fine_run``, which are its own rows at steps of ``step``
     (s).
 
-    growth : by channel, least factor on
-    what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
-    that is not its own deviation. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    growth : by channel, least factor on what a part tells, where errors grow faster than by a power of time;
+    channel_sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
+    ``partial`` is the result, where a channel is no answer.
     """
-    estimates, method_text = by_steps(fine_run, rerun, order, step, growth, sizes)
+    estimates, method_text = by_steps(fine_run, rerun, order, step, growth, channel_sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine_run.channels if name in run.data}
     known |= fine_run.units
     return with_stated_errors(
@@ -176,18 +176,18 @@ def by_steps(
     order: float,
     step: float,
     growth: Mapping[str, float] | None = None,
-    sizes: Mapping[str, float] | None = None,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Estimate], str]:
     """Estimated errors of the channels in ``fine_run``, without units, and a text on how they were estimated.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth, sizes : as in ``estimated``.
+    be, half of it over a part tells. growth, channel_sizes : as in ``estimated``.
     """
     try:
         estimates, method_text = _by_longer_steps(fine_run, rerun, order, step), "runs in longer steps"
     except (InputError, RunFailed):
         estimates, method_text = _by_half_steps(fine_run, rerun, order, step, growth or {}), "a part in half the step"
-    for name, size in (sizes or {}).items():
+    for name, size in (channel_sizes or {}).items():
         estimates[name] = estimate_rescaled(estimates[name], size, step)
     return estimates, method_text
 
@@ -256,9 +256,9 @@ def _growth_after_window(error_rows: np.ndarray, values: np.ndarray) -> float:
     return max(1.0, rougher, (len(values) / len(error_rows)) ** min(power, STEEPEST_ERROR_GROWTH))
 
 
-def estimate_rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
+def estimate_rescaled(estimate: Estimate, channel_size: float, step: float) -> Estimate:
     """The estimate with share and step recomputed for the size of the whole channel; ``step`` is the run's step."""
-    share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
+    share = estimate.error / channel_size if channel_size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
     wanted = (share / GOAL_SHARE) ** (1.0 / estimate.order) if share < math.inf else 1.0
     return replace(estimate, share=share, step=step / _whole_divisor(wanted))
 
@@ -275,11 +275,11 @@ def of_tolerance(
     looser: Series,
     factor: float,
     tolerance: float,
-    sizes: Mapping[str, float] | None = None,
+    channel_sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result of an adaptive method with estimated errors of its channels, from a run whose tolerance is ``factor``
     times as large. The error is assumed to grow only with the power TOLERANCE_POWER of the tolerance, so that it is
-    overestimated. ``sizes`` as in ``estimated``.
+    overestimated. ``channel_sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -294,14 +294,14 @@ def of_tolerance(
             LEAST_TOLERANCE_SHARE * tolerance * size_of(values),
         )
         estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / TOLERANCE_POWER, tolerance)
-        estimates[name] = estimate_rescaled(estimate, (sizes or {}).get(name, size_of(values)), tolerance)
+        estimates[name] = estimate_rescaled(estimate, (channel_sizes or {}).get(name, size_of(values)), tolerance)
     return with_stated_errors(run, estimates, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
-def by_cells(error: float, size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
+def by_cells(error: float, channel_size: float, unit: str, cells: int, order: float, maximum_cells: int) -> Estimate:
     """Estimated error on a grid of ``cells`` cells. Its ``step`` is the number of cells needed for GOAL_SHARE, at most
     ``maximum_cells``."""
-    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL_SHARE) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(maximum_cells, math.ceil(needed))), CELLS_NOTE)
 
@@ -378,10 +378,10 @@ def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> R
     return run
 
 
-def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
+def by_chance(error: float, channel_size: float, unit: str, samples: int) -> Estimate:
     """A standard error as an ``Estimate``; its ``step`` is the number of samples that would reduce the share to
     WARNED_SHARE."""
-    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    share = error / channel_size if channel_size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = samples * max(1.0, (share / WARNED_SHARE) ** 2) if math.isfinite(share) else math.inf
     return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
 

@@ -37,11 +37,11 @@ class InputError(ValueError):
         return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
 
 
-def _value_text(value: Any) -> str:
-    """Return `` = value`` as a scene file would hold it, cut to a readable length."""
-    if value is None:
+def _value_text(shown_value: Any) -> str:
+    """Return `` = shown_value`` as a scene file would hold it, cut to a readable length."""
+    if shown_value is None:
         return ""
-    plain = value.tolist() if hasattr(value, "tolist") else value
+    plain = shown_value.tolist() if hasattr(shown_value, "tolist") else shown_value
     text = str(plain).lower() if isinstance(plain, bool) else repr(plain)
     return f" = {text if len(text) <= LONGEST_VALUE_TEXT else text[: LONGEST_VALUE_TEXT - 3] + '...'}"
 

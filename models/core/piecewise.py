@@ -6,9 +6,9 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True)
-def evaluate(coefficients, period, start, step, sample_count, derivatives):
-    """Values of a piecewise polynomial at start + i step, then its first and second derivatives: shape (sample_count,
-    columns (derivatives + 1)).
+def evaluate(coefficients, period, start_time, step, sample_count, derivatives):
+    """Values of a piecewise polynomial at start_time + i step, then its first and second derivatives: shape
+    (sample_count, columns (derivatives + 1)).
 
     coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
     the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
@@ -16,7 +16,7 @@ def evaluate(coefficients, period, start, step, sample_count, derivatives):
     powers, pieces, columns = coefficients.shape
     values_out = np.empty((sample_count, columns * (derivatives + 1)))
     for row in range(sample_count):
-        time = start + row * step
+        time = start_time + row * step
         piece = min(max(int(np.floor(time / period + 1e-9)), 0), pieces - 1)
         since = time - piece * period
         for order in range(derivatives + 1):

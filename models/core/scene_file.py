@@ -162,26 +162,26 @@ def _set_nested_key(table: dict[str, Any], assignment: str) -> None:
     container[last_key] = _parsed_value(text)
 
 
-def set_key(table: dict[str, Any], key: str, value: Any) -> None:
+def set_key(table: dict[str, Any], key: str, new_value: Any) -> None:
     """Set one nested key, such as "run.step" or "manoeuvres.0.speed", to a plain value; None removes the key.
 
     Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
     """
     if not all(key.split(".")):
         raise InputError("set", "", key, "must name a key, for example run.step")
-    container, last_key = _table_of_key(table, key, value, "set")
-    if value is not None:
-        container[last_key] = value
+    container, last_key = _table_of_key(table, key, new_value, "set")
+    if new_value is not None:
+        container[last_key] = new_value
     elif isinstance(container, list) or last_key in container:
         del container[last_key]
     else:
         raise InputError("set", key, None, "is not in the scene and cannot be taken out", tuple(container))
 
 
-def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
+def _table_of_key(table: dict[str, Any], key: str, new_value: Any, file: str) -> tuple[Any, Any]:
     """The table or list that holds a nested key, created if missing, and the key or index within it.
 
-    value, file : what a message shows as offending, and where it was written.
+    new_value, file : what a message shows as offending, and where it was written.
     """
     *parents, last_key = key.split(".")
     container: Any = table
@@ -189,11 +189,13 @@ def _table_of_key(table: dict[str, Any], key: str, value: Any, file: str) -> tup
         container = (
             container.setdefault(parent, {})
             if isinstance(container, dict)
-            else container[_list_index(container, parent, (file, key, value))]
+            else container[_list_index(container, parent, (file, key, new_value))]
         )
         if not isinstance(container, dict | list):
-            raise InputError(file, key, value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    return container, last_key if isinstance(container, dict) else _list_index(container, last_key, (file, key, value))
+            raise InputError(file, key, new_value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    return container, last_key if isinstance(container, dict) else _list_index(
+        container, last_key, (file, key, new_value)
+    )
 
 
 def _list_index(entries: list[Any], index_text: str, written: tuple[str, str, Any]) -> int:

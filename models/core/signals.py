@@ -42,8 +42,8 @@ class Signal(Protocol):
         """Longest step (s) with which an adaptive solver does not miss a feature of the signal."""
         ...
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start + i step, shape (sample_count, channels)."""
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, channels)."""
         ...
 
     def at(self, time: float) -> np.ndarray:
@@ -88,9 +88,9 @@ class Sampled:
             return self.values[None]
         return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start + i step, shape (sample_count, channels)."""
-        index, fractions = _sample_and_fraction(start, step, sample_count, self.period, len(self.values))
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, channels)."""
+        index, fractions = _sample_and_fraction(start_time, step, sample_count, self.period, len(self.values))
         if self.held:
             return self.values[index]
         from models.core.piecewise import interpolate
@@ -118,11 +118,11 @@ class Sampled:
 
 @lru_cache(maxsize=2)
 def _sample_and_fraction(
-    start: float, step: float, sample_count: int, period: float, samples: int
+    start_time: float, step: float, sample_count: int, period: float, samples: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Index of the sample at or before each time start + i step, and the fraction of a period after it; the same for
     all paths of an ensemble."""
-    position = (start + step * np.arange(sample_count)) / period
+    position = (start_time + step * np.arange(sample_count)) / period
     nearest = np.rint(position)
     snapped = np.where(np.abs(position - nearest) < SNAP_SHARE, nearest, position)
     index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
@@ -174,11 +174,11 @@ class Smooth:
         """Coefficients (powers, periods, value columns), lowest power first, in the time since each sample."""
         return self._pieces
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values and derivatives at start + i step, shape (sample_count, channels)."""
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values and derivatives at start_time + i step, shape (sample_count, channels)."""
         from models.core.piecewise import evaluate
 
-        return evaluate(self._pieces, self.period, start, step, sample_count, self.derivatives)
+        return evaluate(self._pieces, self.period, start_time, step, sample_count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""
@@ -234,9 +234,9 @@ class Stacked:
         """The shortest resolution (s) among the combined signals."""
         return min(signal.resolution for signal in self.parts)
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values of all combined signals at start + i step, shape (sample_count, channels)."""
-        return np.hstack([signal.sample(start, step, sample_count) for signal in self.parts])
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values of all combined signals at start_time + i step, shape (sample_count, channels)."""
+        return np.hstack([signal.sample(start_time, step, sample_count) for signal in self.parts])
 
     def at(self, time: float) -> np.ndarray:
         """Values of all combined signals at one time (s), shape (channels,)."""

@@ -152,11 +152,11 @@ def _draw_legend(figure: Any, grade: float | None) -> None:
     figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
 
-def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None) -> Any:
+def stiffness(sweep: dict[str, np.ndarray], offset_level: Any, limits: Limits, grade: float | None) -> Any:
     """Figure of pitch error and worst damage ratio over stiffness, for every road; the equivalent cut-off is on the
     upper axis.
 
-    sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
+    sweep : per road what ``Bench.sweep`` gives; offset_level : the bench of the road without the grade
     """
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.6))
     for road, curve in sweep.items():
@@ -173,11 +173,13 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
     axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
     axes[1].set(ylim=(None, 1.5 * DAMAGE_AXIS[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
-        axis.axvline(level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
+        axis.axvline(
+            offset_level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here"
+        )
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
-            lambda k: np.sqrt(np.maximum(k, 0.0) / level.pitch_inertia) / (2 * math.pi),
-            lambda f: level.pitch_inertia * (2 * math.pi * f) ** 2,
+            lambda k: np.sqrt(np.maximum(k, 0.0) / offset_level.pitch_inertia) / (2 * math.pi),
+            lambda f: offset_level.pitch_inertia * (2 * math.pi * f) ** 2,
         )
         cutoff_axis = axis.secondary_xaxis("top", functions=turning)
         cutoff_axis.set_xlabel("cut-off of the equivalent high-pass [Hz]")

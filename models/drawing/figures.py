@@ -90,9 +90,9 @@ LETTER_WIDTH = 0.6
 """Width of a letter by its size, of bold ones; of others a tenth less."""
 
 
-def wrapped_text(text: str, inches: float, size: float) -> str:
+def wrapped_text(text: str, inches: float, font_size: float) -> str:
     """Text split into lines that fit into a width (inches) at a font size (points)."""
-    letters_per_line = max(int(72 * inches / (LETTER_WIDTH * size)), 8)
+    letters_per_line = max(int(72 * inches / (LETTER_WIDTH * font_size)), 8)
     return "\n".join("\n".join(wrap(line, letters_per_line, break_long_words=False)) for line in text.split("\n"))
 
 
@@ -109,10 +109,10 @@ def add_heading(figure: Figure, title: str, results: Results | None = None) -> N
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK_FONT_SIZE, color=REJECTED_COLOUR)
 
 
-def empty_figure(size: tuple[float, float] | None = None) -> Figure:
+def empty_figure(figure_size: tuple[float, float] | None = None) -> Figure:
     """An empty figure of a size in inches, or of matplotlib's default size. It does not use pyplot, which is slow to
     import and keeps every figure until it is closed."""
-    figure = Figure(figsize=size)
+    figure = Figure(figsize=figure_size)
     FigureCanvasAgg(figure)
     return figure
 

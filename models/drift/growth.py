@@ -73,11 +73,16 @@ class RigidPitch:
         return rates**2 * self.inertia / self.total_inertia
 
 
-def rigid_pitch(p: Parameters) -> RigidPitch:
+def rigid_pitch(parameters: Parameters) -> RigidPitch:
     """``RigidPitch`` of a pitch-plane parameter set."""
-    mass, coupling = p.m1 + p.m2 + p.m3, p.b * p.m1 - p.a * p.m2
-    carried = p.m1 * p.b**2 + p.m2 * p.a**2 - coupling**2 / mass
-    return RigidPitch(p.b - coupling / mass, p.a + coupling / mass, p.I, carried, mass, coupling)
+    mass, coupling = (
+        parameters.m1 + parameters.m2 + parameters.m3,
+        parameters.b * parameters.m1 - parameters.a * parameters.m2,
+    )
+    carried = parameters.m1 * parameters.b**2 + parameters.m2 * parameters.a**2 - coupling**2 / mass
+    return RigidPitch(
+        parameters.b - coupling / mass, parameters.a + coupling / mass, parameters.I, carried, mass, coupling
+    )
 
 
 def high_passed(values: np.ndarray, sample_period: float, cutoff: float = FAST_PITCH_FREQUENCY) -> np.ndarray:
@@ -93,25 +98,27 @@ def high_passed(values: np.ndarray, sample_period: float, cutoff: float = FAST_P
     return np.fft.irfft(np.fft.rfft(longer) * power / (1.0 + power), len(longer))[beyond : beyond + len(values)]
 
 
-def pitch_rate_of_forces(forces: np.ndarray, sample_period: float, p: Parameters) -> np.ndarray:
+def pitch_rate_of_forces(forces: np.ndarray, sample_period: float, parameters: Parameters) -> np.ndarray:
     """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
     simulation."""
-    rigid = rigid_pitch(p)
+    rigid = rigid_pitch(parameters)
     moment = rigid.moment(forces)
     steps = 0.5 * (moment[1:] + moment[:-1]) * sample_period
     return np.concatenate(([0.0], np.cumsum(steps))) / rigid.total_inertia
 
 
 def growth_rate(
-    pitch_rate: np.ndarray, sample_period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> float:
     """Growth rate lambda (1/s) from the pitch rate (n,) of a run or of ``pitch_rate_of_forces``; forces are vertical in
     space."""
-    return float(np.sqrt(rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean()))
+    return float(
+        np.sqrt(rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff)).mean())
+    )
 
 
 def sinh_law_rate(
-    pitch_rate: np.ndarray, sample_period: float, p: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> np.ndarray:
     """Growth rate lambda (n,) in 1/s for use in the sinh law at each time, if the motion changes along the run.
 
@@ -120,7 +127,7 @@ def sinh_law_rate(
     happens at about two thirds of the time counts most.
     """
     times = sample_period * np.arange(len(pitch_rate))
-    squares = rigid_pitch(p).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
+    squares = rigid_pitch(parameters).squared_growth_rate(high_passed(pitch_rate, sample_period, cutoff))
 
     def weighted(values: np.ndarray) -> np.ndarray:
         second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
@@ -150,21 +157,23 @@ def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensit
     return intensity * t**3 / 3 * np.where(np.abs(x) > SERIES_LIMIT, closed, series)
 
 
-def heave_variance(times: np.ndarray | float, p: Parameters, deviation: float, sample_period: float) -> np.ndarray:
+def heave_variance(
+    times: np.ndarray | float, parameters: Parameters, deviation: float, sample_period: float
+) -> np.ndarray:
     """Variance (m^2) of the common centre of mass: 2 s^2 D / M^2 t^3 / 3. Heave has no growth, in either frame."""
-    mass = rigid_pitch(p).mass
+    mass = rigid_pitch(parameters).mass
     return 2 * deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
-def holding_stiffness(p: Parameters, rate: float) -> float:
+def holding_stiffness(parameters: Parameters, rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that holds the pitch: (I + J) lambda^2."""
-    return rigid_pitch(p).total_inertia * rate**2
+    return rigid_pitch(parameters).total_inertia * rate**2
 
 
-def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+def spring_of(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """Stiffness and damping of a pitch spring to the ground with a natural frequency (Hz): k = (I + J) wc^2 in N m/rad,
     d = 2 zeta (I + J) wc in N m s/rad."""
-    corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total_inertia
+    corner, inertia = 2 * math.pi * frequency, rigid_pitch(parameters).total_inertia
     return inertia * corner**2, 2 * damping_ratio * inertia * corner
 
 

@@ -79,14 +79,14 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
     return Consistency(tuple(figures))
 
 
-def _mean_innovation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
+def _mean_innovation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
     """Statistic of the mean innovation, in units of its standard deviation."""
     known = column[np.isfinite(column)]
-    wide = float(norm.isf(tail)) / math.sqrt(len(known))
+    wide = float(norm.isf(tail_probability)) / math.sqrt(len(known))
     return AcceptedStatistic(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
-def _correlation(name: str, column: np.ndarray, tail: float) -> AcceptedStatistic:
+def _correlation(name: str, column: np.ndarray, tail_probability: float) -> AcceptedStatistic:
     """Statistic of serial correlation: root mean square of the correlations at lags 1 to CORRELATION_LAGS.
 
     For white samples each correlation is normal, with a variance of one over the number of pairs (Box and Pierce).
@@ -102,5 +102,5 @@ def _correlation(name: str, column: np.ndarray, tail: float) -> AcceptedStatisti
         / power
     )
     size = math.sqrt(float(np.sum(pairs * correlations**2)) / float(pairs.sum()))
-    high = math.sqrt(float(chi2.isf(tail, len(lags))) / float(pairs.sum()))
+    high = math.sqrt(float(chi2.isf(tail_probability, len(lags))) / float(pairs.sum()))
     return AcceptedStatistic(f"correlation of {name}", size, 0.0, high)

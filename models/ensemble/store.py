@@ -120,17 +120,17 @@ def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
     return dict(_flat_items("", {**facts, "code of models": _code_checksum(), "versions": versions}))
 
 
-def _flat_items(key_path: str, value: Any) -> list[tuple[str, Any]]:
-    if isinstance(value, dict):
+def _flat_items(key_path: str, job_value: Any) -> list[tuple[str, Any]]:
+    if isinstance(job_value, dict):
         return [
             pair
-            for key, inner in value.items()
+            for key, inner in job_value.items()
             for pair in _flat_items(f"{key_path}.{key}" if key_path else str(key), inner)
         ]
-    if isinstance(value, np.ndarray):
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return [(key_path, f"{value.dtype} {list(value.shape)} {digest}")]
-    return [(key_path, list(value) if isinstance(value, tuple) else value)]
+    if isinstance(job_value, np.ndarray):
+        digest = hashlib.sha256(np.ascontiguousarray(job_value).tobytes()).hexdigest()[:16]
+        return [(key_path, f"{job_value.dtype} {list(job_value.shape)} {digest}")]
+    return [(key_path, list(job_value) if isinstance(job_value, tuple) else job_value)]
 
 
 @cache
@@ -146,25 +146,25 @@ def checksum_of_sources(root: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def named_files(value: Any, folder: Path) -> dict[str, str]:
+def named_files(job_value: Any, folder: Path) -> dict[str, str]:
     """Checksum of each file that a text names, by that text; paths start from ``folder`` or from the working folder.
 
-    value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
+    job_value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
     """
     hashes: dict[str, str] = {}
-    _collect_files(value, folder, hashes, set())
+    _collect_files(job_value, folder, hashes, set())
     return hashes
 
 
-def _collect_files(value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
-    if isinstance(value, dict | list | tuple):
-        for inner in value.values() if isinstance(value, dict) else value:
+def _collect_files(job_value: Any, folder: Path, hashes: dict[str, str], paths_seen: set[Path]) -> None:
+    if isinstance(job_value, dict | list | tuple):
+        for inner in job_value.values() if isinstance(job_value, dict) else job_value:
             _collect_files(inner, folder, hashes, paths_seen)
-    elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in paths_seen:
+    elif isinstance(job_value, str) and (path := _file(job_value, folder)) and path.resolve() not in paths_seen:
         paths_seen.add(path.resolve())
         content = path.read_bytes()
-        hashes[value] = hashes.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
+        hashes[job_value] = hashes.get(job_value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
             _collect_files(_table(content), path.parent, hashes, paths_seen)
 
@@ -188,9 +188,9 @@ def _of_module(name: str) -> Path | None:
     return Path(spec.origin) if spec and spec.origin and os.path.isfile(spec.origin) else None
 
 
-def _table(content: bytes) -> Any:
+def _table(file_content: bytes) -> Any:
     """Contents of a TOML file; empty if it is not valid, which is reported when the scene is read."""
     try:
-        return tomllib.loads(content.decode("utf-8-sig"))
+        return tomllib.loads(file_content.decode("utf-8-sig"))
     except ValueError:
         return None

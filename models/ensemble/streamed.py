@@ -92,10 +92,10 @@ class Tally:
         """Number of occurrences (m,) of each of ``values``."""
         return np.array([self._counts[value] for value in sorted(self._counts)])
 
-    def quantile(self, level: float) -> tuple[float, float, float]:
+    def quantile(self, probability: float) -> tuple[float, float, float]:
         """Quantile and the ends of its 95 % interval, identical to ``statistics.quantile`` of all values."""
         upto = np.cumsum(self.counts)
-        ranks = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), level)), side="right")
+        ranks = np.searchsorted(upto, np.array(quantile_ranks(int(upto[-1]), probability)), side="right")
         low, high, upper = (float(self.values[rank]) for rank in ranks)
         return low, high, upper
 
@@ -123,10 +123,10 @@ class Spread:
         cells = (np.arange(columns) * self._bins + bin_numbers)[known]
         self._counts += np.bincount(cells, minlength=self._counts.size).reshape(self._counts.shape)
 
-    def percentiles(self, levels: tuple[float, ...]) -> np.ndarray:
-        """Percentiles (levels, k) of the magnitudes; NaN where a column has no values."""
+    def percentiles(self, probabilities: tuple[float, ...]) -> np.ndarray:
+        """Percentiles (probabilities, k) of the magnitudes; NaN where a column has no values."""
         upto = self._counts.cumsum(axis=1)
-        wanted = np.array(levels)[:, None] / 100.0 * (upto[:, -1] - 1)
+        wanted = np.array(probabilities)[:, None] / 100.0 * (upto[:, -1] - 1)
         bin_numbers = (upto[None] <= np.floor(wanted)[:, :, None]).sum(axis=2)
         middle = SMALLEST_MAGNITUDE * np.exp(self._width * bin_numbers) * (1.0 - QUANTILE_ACCURACY)
         return np.where(upto[:, -1] > 0, np.where(bin_numbers == 0, 0.0, middle), np.nan)

@@ -70,10 +70,10 @@ class Processes(Executor):
         self._ours.close()
         self._theirs.close()
 
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
-        if kind is not None:
+    def __exit__(self, error_type: Any, error: Any, trace: Any) -> None:
+        if error_type is not None:
             self._ours.close()  # nobody waits for what is not wanted any more
-        self.shutdown(cancel_futures=kind is not None)
+        self.shutdown(cancel_futures=error_type is not None)
 
 
 def process_pool(workers: int) -> Processes:

@@ -6,15 +6,15 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")
-def rainflow_cycles(turns):
+def rainflow_cycles(turning_points):
     """Ranges (c,), means (c,) and counts (c,) of the cycles of turning points (n,); open ones, the residue, count 0.5.
 
     Consecutive points differ and turn; the first and the last point of a load count among them.
     """
-    stack, closed, first_range, top = np.empty(len(turns)), np.empty((len(turns), 3)), 0, 0
+    stack, closed, first_range, top = np.empty(len(turning_points)), np.empty((len(turning_points), 3)), 0, 0
     n = 0
-    for i in range(len(turns)):
-        stack[top] = turns[i]
+    for i in range(len(turning_points)):
+        stack[top] = turning_points[i]
         top += 1
         while top - first_range >= 3:
             last_range, previous_range = abs(stack[top - 1] - stack[top - 2]), abs(stack[top - 2] - stack[top - 3])

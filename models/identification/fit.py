@@ -103,15 +103,15 @@ def _one_stage(problem: Problem, values: np.ndarray, executor: Executor | None) 
     return {"values": solved.x * scale, "cost": np.array(solved.cost)}
 
 
-def fit_with_held(problem: Problem, k: int, value: float, start: np.ndarray) -> Problem:
-    """The fit with parameter ``k`` fixed at a value; the others start from ``start`` (p,)."""
+def fit_with_held(problem: Problem, k: int, fixed_value: float, start_values: np.ndarray) -> Problem:
+    """The fit with parameter ``k`` fixed at a value; the others start from ``start_values`` (p,)."""
     other_parameters = [
         replace(parameter, start=float(start_value))
-        for parameter, start_value in zip(problem.parameters, start, strict=True)
+        for parameter, start_value in zip(problem.parameters, start_values, strict=True)
     ]
     del other_parameters[k]
 
     def model(values: np.ndarray) -> object:
-        return problem.model(np.insert(values, k, value))
+        return problem.model(np.insert(values, k, fixed_value))
 
     return replace(problem, model=model, parameters=other_parameters)  # type: ignore[arg-type]

@@ -39,30 +39,34 @@ class Identified:
 
 
 def identified_vehicle(
-    first_stretch: Any, second_stretch: Any, search: Search, progress: Progress = lambda text, share: None
+    first_stretch: Any, second_stretch: Any, parameter_search: Search, progress: Progress = lambda text, share: None
 ) -> Identified:
     """Fit to the first stretch of a measurement, cross-validation on parts of it, and prediction of the second stretch
     with bands."""
-    problem = _fit_problem(first_stretch, search)
+    problem = _fit_problem(first_stretch, parameter_search)
     solved = fit(problem, report_stage=lambda text, share: progress(text, 0.4 * share))
     known = uncertainty(solved)
-    crossed = cross_validated(solved, search.blocks, progress)
+    crossed = cross_validated(solved, parameter_search.blocks, progress)
     predicted = problem.predicted(solved.values)
     errors = [
         error_model(row[channel.is_used], model[channel.is_used])
         for row, model, channel in zip(crossed, predicted, problem.channels, strict=True)
     ]
     progress("the prediction", 0.9)
-    return Identified(known, errors, crossed, error_bands(_fit_problem(second_stretch, search), known, errors))
+    return Identified(
+        known, errors, crossed, error_bands(_fit_problem(second_stretch, parameter_search), known, errors)
+    )
 
 
-def _fit_problem(scene: Any, search: Search) -> Problem:
-    full_problem = problem_of(scene, scene.path(scene.drive.file), search.parameters, low_pass=search.low_pass)
+def _fit_problem(scene: Any, parameter_search: Search) -> Problem:
+    full_problem = problem_of(
+        scene, scene.path(scene.drive.file), parameter_search.parameters, low_pass=parameter_search.low_pass
+    )
     channels = {channel.name: channel for channel in full_problem.channels}
-    missing = next((name for name in search.channels if name not in channels), None)
+    missing = next((name for name in parameter_search.channels if name not in channels), None)
     if missing:
         raise InputError(scene.drive.file, missing, None, "this channel is compared: it must be in the file")
-    return replace(full_problem, channels=[channels[name] for name in search.channels])
+    return replace(full_problem, channels=[channels[name] for name in parameter_search.channels])
 
 
 def cross_validated(solved: Fit, part_count: int, progress: Progress) -> np.ndarray:

@@ -66,9 +66,9 @@ def scene_value(scene: Any, key: str) -> tuple[float, float, float]:
     return float(value), low, high
 
 
-def _limit_ends(limit: Any, *names: str) -> list[float]:
+def _limit_ends(field_limit: Any, *names: str) -> list[float]:
     """Lower and upper end that a field's limit names; none for the general limit on all quantities."""
-    ends = (getattr(limit, name, None) for name in names)
+    ends = (getattr(field_limit, name, None) for name in names)
     return [end for end in ends if end is not None and abs(end) < LARGEST_QUANTITY]
 
 
@@ -155,11 +155,11 @@ def _check_names(scene: Any, measurement: str | Path, engine: str) -> None:
     _channels_with_names(source, measurement, tuple(names))
 
 
-def _channels_with_names(source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
+def _channels_with_names(measurement_source: Source, path: str | Path, names: tuple[str, ...]) -> list[str]:
     """Channels of a measurement that have one of these names; InputError if there are none."""
-    named = [channel.name for channel in source.channels if channel.name in names]
+    named = [channel.name for channel in measurement_source.channels if channel.name in names]
     if not named:
-        theirs = [channel.name for channel in source.channels]
+        theirs = [channel.name for channel in measurement_source.channels]
         raise InputError(path, "", theirs[0] if theirs else None, "no channel has the name of one of the run", names)
     return named
 

@@ -139,10 +139,11 @@ def set_rates(state, speed, body, rails, state_rate, report, workspace):
 
 
 @lean
-def _add_suspension_forces(state, body, turning, axle, force, moment):
-    """Add the forces of springs and dampers at both ends of the axle; turning : angular velocity about the x and y of
-    the axle's own axes (rad/s)."""
-    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = turning, body.stiffness, body.damping
+def _add_suspension_forces(state, body, angular_velocity, axle, force, moment):
+    """Add the forces of springs and dampers at both ends of the axle; angular_velocity : angular velocity about the x
+    and y of the axle's own axes (rad/s).
+    """
+    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = angular_velocity, body.stiffness, body.damping
     for side in (1.0, -1.0):
         arm, turn_z = side * body.arm, state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
@@ -264,12 +265,12 @@ class Equations:
         """Largest possible number of contacts of both wheels together."""
         return int(count_of_patches(self.rails.profile))
 
-    def empty_contacts(self, *shape: int) -> Array:
+    def empty_contacts(self, *record_shape: int) -> Array:
         """Records REPORT (*shape, patches) for contacts that are not yet known.
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
-        return np.full((*shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
+        return np.full((*record_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
         """Time derivative (10,) of a state (10,)."""
@@ -303,14 +304,16 @@ class Equations:
             start[Z] += rise
         return self._state_in_balance(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _state_in_balance(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
+    def _state_in_balance(
+        self, start_state: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]
+    ) -> Array:
         """State in which two values, ``coordinates``, are solved for so that two accelerations vanish."""
         state_indices = list(coordinates)
-        scale = np.maximum(np.abs(start[state_indices]), self.body.sunk)
+        scale = np.maximum(np.abs(start_state[state_indices]), self.body.sunk)
 
-        def displaced(unknown: Array) -> Array:
-            state = start.copy()
-            state[state_indices] += unknown * scale
+        def displaced(unknowns: Array) -> Array:
+            state = start_state.copy()
+            state[state_indices] += unknowns * scale
             return state
 
         solution = root(lambda unknown: self.rates(displaced(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)

@@ -74,22 +74,22 @@ class KlingelWave:
 
 
 def equivalent_conicity(
-    displacements: Array, differences: Array, amplitude: float, *, guess: float | None = None
+    displacements: Array, differences: Array, amplitude: float, *, centre_guess: float | None = None
 ) -> float:
     """Equivalent conicity by EN 15302 at an amplitude, which is half of peak to peak; see ``klingel_wave``.
 
     displacements : (n,) lateral, to the right, rising; differences : (n,) of the rolling radii, right less left;
     amplitude : above 0. All in one unit of length.
     """
-    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, guess=guess).conicity
+    return klingel_wave(RollingRadiusTable(displacements, differences), amplitude, centre_guess=centre_guess).conicity
 
 
-def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> KlingelWave:
+def klingel_wave(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> KlingelWave:
     """Klingel's wave of an amplitude (the table's unit, half of peak to peak).
 
-    guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there is no
-    wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the table; or
-    where there are several and ``guess`` is not given.
+    centre_guess : where the centre is looked for, if several waves have this amplitude. Raises InputError where there
+    is no wave: dr without a change of sign, dr that falls with the displacement, an amplitude whose wave leaves the
+    table; or where there are several and ``centre_guess`` is not given.
     """
     amplitude = number("amplitude", amplitude, "an amplitude above 0, half of peak to peak", 1e-12)
     first_displacement, last_displacement = table.ends
@@ -106,11 +106,11 @@ def klingel_wave(table: RollingRadiusTable, amplitude: float, *, guess: float | 
     ]
     if not waves:
         return _without_wave(table, amplitude)
-    if len(waves) > 1 and guess is None:
+    if len(waves) > 1 and centre_guess is None:
         centres = ", ".join(f"{wave.centre:.6g}" for wave in waves)
         allowed = f"has {len(waves)} waves, about {centres}: smooth the table, or choose one by near"
         raise InputError(table.source, "amplitude", amplitude, allowed)
-    return min(waves, key=lambda wave: abs(wave.centre - (guess or 0.0)))
+    return min(waves, key=lambda wave: abs(wave.centre - (centre_guess or 0.0)))
 
 
 def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
@@ -135,19 +135,22 @@ def _turning_points(table: RollingRadiusTable, amplitude: float) -> list[float]:
     return [points[k] for k in separate]
 
 
-def _parabola_roots(begin: float, middle_value: float, end_value: float) -> list[float]:
+def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -> list[float]:
     """Roots between 0 and 1 of the parabola with the given values at 0, 1/2 and 1; empty if it is zero everywhere."""
-    bend, slope = 2.0 * (begin - 2.0 * middle_value + end_value), 4.0 * middle_value - 3.0 * begin - end_value
-    scale = max(abs(begin), abs(middle_value), abs(end_value))
+    bend, slope = (
+        2.0 * (begin_value - 2.0 * middle_value + end_value),
+        4.0 * middle_value - 3.0 * begin_value - end_value,
+    )
+    scale = max(abs(begin_value), abs(middle_value), abs(end_value))
     if scale == 0.0:
         return []
     if abs(bend) <= 1e-14 * abs(slope):
-        roots = [-begin / slope] if slope else []
-    elif (discriminant := slope * slope - 4.0 * bend * begin) < 0.0:
+        roots = [-begin_value / slope] if slope else []
+    elif (discriminant := slope * slope - 4.0 * bend * begin_value) < 0.0:
         roots = []
     else:
         half = -0.5 * (slope + math.copysign(math.sqrt(discriminant), slope))
-        roots = [half / bend] + ([begin / half] if half else [])
+        roots = [half / bend] + ([begin_value / half] if half else [])
     return sorted(min(max(root, 0.0), 1.0) for root in roots if -1e-12 <= root <= 1.0 + 1e-12)
 
 
@@ -276,14 +279,14 @@ class ConicityRow:
     spacing_error: float
 
 
-def conicity_row(table: RollingRadiusTable, amplitude: float, *, guess: float | None = None) -> ConicityRow:
+def conicity_row(table: RollingRadiusTable, amplitude: float, *, centre_guess: float | None = None) -> ConicityRow:
     """Both conicities of a table at an amplitude; InputError as ``klingel_wave``."""
-    wave = klingel_wave(table, amplitude, guess=guess)
+    wave = klingel_wave(table, amplitude, centre_guess=centre_guess)
     harmonic = harmonic_linearised_conicity(
         table.displacements, table.differences, amplitude * (1.0 - 1e-12), wave.centre
     )
     try:
-        coarse = klingel_wave(table.without_every_second_row(), amplitude, guess=wave.centre).conicity
+        coarse = klingel_wave(table.without_every_second_row(), amplitude, centre_guess=wave.centre).conicity
     except InputError:
         coarse = math.nan
     return ConicityRow(amplitude, wave.centre, wave.period, wave.conicity, harmonic, abs(coarse - wave.conicity))

@@ -198,15 +198,15 @@ def _continued_orbit(
 
 
 def solved_orbit(
-    guess: Orbit, unknown: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
+    orbit_guess: Orbit, sought_quantity: SoughtQuantity, *, precise: bool = True, executor: Executor | None = None
 ) -> Orbit:
-    """Orbit near a guess. ``unknown`` is solved for: speed or amplitude, while the other keeps the guess's value. A
-    precise one gets its own slopes.
+    """Orbit near a guess. ``sought_quantity`` is solved for: speed or amplitude, while the other keeps the guess's
+    value. A precise one gets its own slopes.
 
     The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
     Raises RunFailed if none is found.
     """
-    orbit, fresh, left = guess, False, math.inf
+    orbit, fresh, left = orbit_guess, False, math.inf
     for _ in range(MOST_NEWTON_STEPS):
         try:
             end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.steps)
@@ -218,16 +218,20 @@ def solved_orbit(
             return orbit if fresh or not precise else _with_slopes(orbit, executor)
         if not fresh and size > LEAST_GAIN * left:
             orbit, fresh = _with_slopes(orbit, executor), True
-        orbit, left, fresh = _newton_corrected(orbit, missed, unknown), size, False
-    raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
+        orbit, left, fresh = _newton_corrected(orbit, missed, sought_quantity), size, False
+    raise RunFailed(
+        "wheelset", f"no periodic motion was found near {orbit_guess.speed:.6g} m/s and {orbit_guess.amplitude:.3g} m"
+    )
 
 
-def refined_orbit(known_orbit: Orbit, unknown: SoughtQuantity, executor: Executor | None = None) -> Orbit:
+def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor: Executor | None = None) -> Orbit:
     """The orbit computed with half the step, with the changes of its speed or amplitude and of its frequency."""
-    half = solved_orbit(replace(known_orbit, steps=2 * known_orbit.steps), unknown, precise=False, executor=executor)
+    half = solved_orbit(
+        replace(known_orbit, steps=2 * known_orbit.steps), sought_quantity, precise=False, executor=executor
+    )
     return replace(
         half,
-        error=abs(getattr(half, unknown) - getattr(known_orbit, unknown)),
+        error=abs(getattr(half, sought_quantity) - getattr(known_orbit, sought_quantity)),
         frequency_error=abs(half.frequency - known_orbit.frequency),
     )
 
@@ -259,21 +263,21 @@ def _with_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
     return replace(known_orbit, slopes=np.array(columns).T)
 
 
-def _ends_of_period(pair: list[Guess], steps: int) -> list[Array]:
-    return [_state_after(*guess, steps) for guess in pair]
+def _ends_of_period(guess_pair: list[Guess], steps: int) -> list[Array]:
+    return [_state_after(*guess, steps) for guess in guess_pair]
 
 
-def _newton_corrected(known_orbit: Orbit, missed: Array, unknown: SoughtQuantity) -> Orbit:
+def _newton_corrected(known_orbit: Orbit, missed: Array, sought_quantity: SoughtQuantity) -> Orbit:
     """The orbit after one Newton correction with its slopes; the lateral rate stays zero."""
     returned = known_orbit.slopes.copy()
     returned[:, : len(RETURNING_STATES)] -= np.eye(len(RETURNING_STATES))
     free = [k for k in SECTION_COORDINATES if k != AMPLITUDE_INDEX]
-    columns = [*free, AMPLITUDE_INDEX if unknown == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
+    columns = [*free, AMPLITUDE_INDEX if sought_quantity == "amplitude" else SPEED_COLUMN, PERIOD_COLUMN]
     *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
     state, speed = known_orbit.state.copy(), known_orbit.speed
     state_indices = [RETURNING_STATES[k] for k in free]
     state[state_indices] += section * STATE_SIZES[state_indices]
-    if unknown == "amplitude":
+    if sought_quantity == "amplitude":
         state[Y] += change * STATE_SIZES[Y]
     else:
         speed += change
@@ -282,14 +286,15 @@ def _newton_corrected(known_orbit: Orbit, missed: Array, unknown: SoughtQuantity
 
 
 def attained_cycle(
-    equations: Equations, *, start: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
+    equations: Equations, *, start_displacement: float = 5e-3, step: float = 5e-4, executor: Executor | None = None
 ) -> Orbit | None:
-    """The limit cycle that a wheelset reaches from a lateral displacement ``start`` (m); None if the motion dies out.
+    """The limit cycle that a wheelset reaches from a lateral displacement ``start_displacement`` (m); None if the
+    motion dies out.
 
     The motion is marched in steps (s) of this size until it repeats itself about, and then closed by Newton's method.
     Raises InputError for a step that is too large, RunFailed if the wheelset leaves the track or does not settle.
     """
-    state = equations.displaced_state(start)
+    state = equations.displaced_state(start_displacement)
     for _ in range(MOST_MARCHES):
         path = equations.run(state, MARCH_DURATION, step)
         y, state = path.states[:, Y], path.states[-1]

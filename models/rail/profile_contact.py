@@ -77,7 +77,7 @@ _LEAST_DEPTH_SQUARE = 1e-40
 
 
 @njit(cache=True, error_model="numpy")
-def profile_on_rail(side, pose, profile, modulus, touches):
+def profile_on_rail(wheel_side, pose, profile, modulus, touches):
     """Fill ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or less is no contact.
 
     pose : ``Pose``; profile : ``LaidProfile``; modulus : E* (Pa).
@@ -86,7 +86,7 @@ def profile_on_rail(side, pose, profile, modulus, touches):
     sums = np.zeros(int(head.zones), _SUMS)
     y, z, roll, yaw = pose
     wheel_pose = _pose_of_wheel(
-        side * y, z + head.level, side * roll, side * yaw
+        wheel_side * y, z + head.level, wheel_side * roll, wheel_side * yaw
     )  # the left wheel is the right one in a mirror
     knot, previous_depth = 0, -1.0
     for j in range(0, int(head.nodes), COARSE_NODES):
@@ -100,7 +100,7 @@ def profile_on_rail(side, pose, profile, modulus, touches):
         previous_depth = node[0]
     together = 0
     for zone in range(len(sums)):
-        _fill_touch(side, sums[zone], wheel_pose, touches[zone])
+        _fill_touch(wheel_side, sums[zone], wheel_pose, touches[zone])
         together += touches[zone].depth > 0.0
     if together > 1:
         settle_depths(touches, modulus)
@@ -172,7 +172,7 @@ def _add_node(node, node_contact, length, zone_sums):
 
 
 @lean
-def _fill_touch(side, zone_sums, wheel_pose, touch):
+def _fill_touch(wheel_side, zone_sums, wheel_pose, touch):
     """Fill one touch from the sums of its zone."""
     touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
     weight_sum = zone_sums.w2
@@ -181,8 +181,12 @@ def _fill_touch(side, zone_sums, wheel_pose, touch):
     middle, size = zone_sums.s1 / weight_sum, math.hypot(zone_sums.n_y, zone_sums.n_z)
     depth, n_y, n_z = 3.5 / 3.0 * zone_sums.w3 / weight_sum, zone_sums.n_y / size, zone_sums.n_z / size
     spread = max(0.0, 7.0 * (zone_sums.s2 / weight_sum - middle * middle))
-    touch.depth, touch.n_y, touch.n_z = depth, side * n_y, n_z
-    touch.x, touch.y, touch.z = zone_sums.x / weight_sum, side * zone_sums.y / weight_sum, zone_sums.z / weight_sum
+    touch.depth, touch.n_y, touch.n_z = depth, wheel_side * n_y, n_z
+    touch.x, touch.y, touch.z = (
+        zone_sums.x / weight_sum,
+        wheel_side * zone_sums.y / weight_sum,
+        zone_sums.z / weight_sum,
+    )
     _, _, cr, sr, cy = wheel_pose[:5]
     touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * weight_sum / zone_sums.radius
     touch.across = depth / (spread + depth / SHARPEST_CURVATURE)

@@ -83,9 +83,9 @@ class RollingRadiusTable:
         ends = self.difference(low, "right"), self.difference(high, "left")
         return np.array([low, *y[first_row:last_row], high]), np.array([ends[0], *dr[first_row:last_row], ends[1]])
 
-    def difference(self, displacement: float, side: Any = "right") -> float:
+    def difference(self, displacement: float, side_of_jump: Any = "right") -> float:
         """Rolling radius difference at a displacement; at a jump, the value on the given side of it."""
-        i, share = self._row_before(displacement, side)
+        i, share = self._row_before(displacement, side_of_jump)
         dr = self.differences
         return float(dr[i] + share * (dr[i + 1] - dr[i]))
 
@@ -96,10 +96,10 @@ class RollingRadiusTable:
         step = share * (y[i + 1] - y[i])
         return float(self.potential[i] + step * (dr[i] + 0.5 * share * (dr[i + 1] - dr[i])))
 
-    def _row_before(self, displacement: float, side: Any) -> tuple[int, float]:
+    def _row_before(self, displacement: float, side_of_jump: Any) -> tuple[int, float]:
         """Index of the row before a displacement, and the position between that row and the next, as a share."""
         y = self.displacements
-        i = int(np.clip(np.searchsorted(y, displacement, side) - 1, 0, y.size - 2))
+        i = int(np.clip(np.searchsorted(y, displacement, side_of_jump) - 1, 0, y.size - 2))
         width = y[i + 1] - y[i]
         return i, float((displacement - y[i]) / width) if width > 0.0 else 0.0
 
@@ -151,7 +151,7 @@ def _rolling_radii(right_side: WheelAndRail, left_side: WheelAndRail, lateral_sh
     return rolling_radius(right_side, pose), rolling_radius(left_side, Pose(-lateral_shift, 0.0, -pose.roll, pose.fall))
 
 
-def rolling_radius(side: WheelAndRail, pose: Pose) -> float:
+def rolling_radius(wheel_and_rail: WheelAndRail, pose: Pose) -> float:
     """Radius (m) of a wheel at the point nearest to its rail."""
-    across = float((pose.turn.T @ (lowest_point(side, pose) - side.centre(pose)))[1])
-    return float(side.wheelset.radius + side.wheel.curve(across - side.wheelset.arm))
+    across = float((pose.turn.T @ (lowest_point(wheel_and_rail, pose) - wheel_and_rail.centre(pose)))[1])
+    return float(wheel_and_rail.wheelset.radius + wheel_and_rail.wheel.curve(across - wheel_and_rail.wheelset.arm))

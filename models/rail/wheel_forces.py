@@ -367,9 +367,9 @@ def _longitudinal_curvature(rolling, conicity):
 
 
 @inlined
-def _flange_force(side, y, wheels):
+def _flange_force(wheel_side, y, wheels):
     """Lateral force (N) of a cone's flange at a lateral position y."""
-    return -side * wheels.flange * max(0.0, side * y - wheels.clearance)
+    return -wheel_side * wheels.flange * max(0.0, wheel_side * y - wheels.clearance)
 
 
 @inlined
@@ -379,13 +379,15 @@ def _patch_place(touch):
 
 
 @inlined
-def _patch_motion(patch_point, velocity, turning):
+def _patch_motion(patch_point, velocity, angular_velocity):
     """``PatchMotion`` of a patch, from velocity and angular velocity of the wheelset."""
     n_y, n_z, cx, cy, cz = patch_point
-    vx = velocity[0] + turning[1] * cz - turning[2] * cy
-    vy = velocity[1] + turning[2] * cx - turning[0] * cz
-    vz = velocity[2] + turning[0] * cy - turning[1] * cx
-    return PatchMotion(vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz)
+    vx = velocity[0] + angular_velocity[1] * cz - angular_velocity[2] * cy
+    vy = velocity[1] + angular_velocity[2] * cx - angular_velocity[0] * cz
+    vz = velocity[2] + angular_velocity[0] * cy - angular_velocity[1] * cx
+    return PatchMotion(
+        vx, vy, n_z * vy - n_y * vz, angular_velocity[1] * n_y + angular_velocity[2] * n_z, n_y * vy + n_z * vz
+    )
 
 
 @inlined

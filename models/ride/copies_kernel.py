@@ -78,9 +78,9 @@ def on_curve(curves, spring, argument, force):
 
 
 @lean
-def off_road(u, x, road, tyres, pressed, rate, lost):
-    """Fill ``lost`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0 on the
-    road, and cancels the pull of a lifted tyre.
+def off_road(u, x, road, tyres, pressed, rate, missing_force):
+    """Fill ``missing_force`` (copies,) in N, the force of a tyre that only pushes less that of a linear tyre. It is 0
+    on the road, and cancels the pull of a lifted tyre.
 
     pressed, rate (copies,) are overwritten.
     """
@@ -92,10 +92,10 @@ def off_road(u, x, road, tyres, pressed, rate, lost):
     for j in range(n):
         add(pressed, -tyres.heights[u, j], x[j])
         add(rate, -tyres.heights[u, j], x[n + j])
-    for c in range(lost.size):
+    for c in range(missing_force.size):
         elastic = load + stiffness * pressed[c]
         total_force = elastic + damping * rate[c]
-        lost[c] = max(min(total_force, 2.0 * elastic), 0.0) - total_force
+        missing_force[c] = max(min(total_force, 2.0 * elastic), 0.0) - total_force
 
 
 @lean
@@ -143,13 +143,13 @@ def fill_output(p, x, road, rate, force, laws, output):
 
 
 @lean
-def sum_up(value, power_sums, p, first):
+def sum_up(output_values, power_sums, p, first):
     """Add the first four powers of output p (copies,) to their sums, in columns from copy ``first`` on."""
-    for c in range(value.size):
-        square = value[c] * value[c]
-        power_sums[0, p, first + c] += value[c]
+    for c in range(output_values.size):
+        square = output_values[c] * output_values[c]
+        power_sums[0, p, first + c] += output_values[c]
         power_sums[1, p, first + c] += square
-        power_sums[2, p, first + c] += square * value[c]
+        power_sums[2, p, first + c] += square * output_values[c]
         power_sums[3, p, first + c] += square * square
 
 

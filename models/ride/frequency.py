@@ -154,11 +154,12 @@ def _check_stable(vehicle: LinearVehicle) -> None:
 
 
 def _halve_panels(
-    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, limit: np.ndarray
+    over: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, panels: np.ndarray, largest_change: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most ``limit``
-    (p,)."""
-    variance, error = np.zeros_like(limit), np.zeros_like(limit)
+    """Sums (p,) over panels, and the last changes; panels are halved until that changes each sum by at most
+    ``largest_change`` (p,).
+    """
+    variance, error = np.zeros_like(largest_change), np.zeros_like(largest_change)
     panels_used, lowest = 2 * len(edges), edges[0, 1] / 64
     while len(edges):
         finer = np.column_stack([edges[:, 0], edges.mean(axis=1), edges.mean(axis=1), edges[:, 1]]).reshape(-1, 2)
@@ -166,7 +167,7 @@ def _halve_panels(
         panels_used += len(finer)
         halves = parts.reshape(len(edges), 2, -1).sum(axis=1)
         change = abs(halves - panels)
-        rough = (change > limit).any(axis=1) & (edges[:, 1] > lowest) & (panels_used < MOST_PANELS)
+        rough = (change > largest_change).any(axis=1) & (edges[:, 1] > lowest) & (panels_used < MOST_PANELS)
         variance += halves[~rough].sum(axis=0)
         error += change[~rough].sum(axis=0)
         edges, panels = finer[np.repeat(rough, 2)], parts[np.repeat(rough, 2)]

@@ -118,16 +118,16 @@ def at_constant_speed(
 
 
 def path_cell(
-    lengths: Sequence[float], longest: float, tolerance: float = AXLE_SHIFT_TOLERANCE
+    lengths: Sequence[float], longest_cell: float, tolerance: float = AXLE_SHIFT_TOLERANCE
 ) -> tuple[float, np.ndarray]:
-    """Length (m) of a path cell, at most ``longest``, and by how many cells each axle is behind the first.
+    """Length (m) of a path cell, at most ``longest_cell``, and by how many cells each axle is behind the first.
 
     All distances are whole numbers of cells up to ``tolerance`` (m), the last axle's exactly.
     """
     behind = np.asarray(lengths)
     if behind[-1] == 0.0:
-        return longest, np.zeros(len(behind), int)
-    count = int(np.ceil(behind[-1] / longest))
+        return longest_cell, np.zeros(len(behind), int)
+    count = int(np.ceil(behind[-1] / longest_cell))
     while True:
         cell = behind[-1] / count
         if np.abs(np.rint(behind / cell) * cell - behind).max() <= tolerance:

@@ -98,16 +98,16 @@ def copies_in_time(
     *,
     copies: int = 500,
     seed: int = 0,
-    longest: float | None = None,
+    longest_step: float | None = None,
 ) -> Copies:
     """Run the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial state.
 
-    longest : largest step (s); by itself it comes from the fastest rates.
+    longest_step : largest step (s); by itself it comes from the fastest rates.
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
     check_rates(vehicle, excitation)
     replaced = statistically_linear(vehicle.with_tyres(pushes_only=False), excitation, speed).vehicle
-    road = road_path(excitation, speed, longest or usual_step(vehicle, speed, replaced))
+    road = road_path(excitation, speed, longest_step or usual_step(vehicle, speed, replaced))
     settling, counted = int(np.ceil(settling_time(replaced) / road.step)), int(np.ceil(duration / road.step))
     march = CopiesMarch(vehicle, speed, road.step, copies)
     for number, portion in enumerate(road.blocks(STEPS_PER_BLOCK, copies, seed)):

@@ -110,10 +110,10 @@ class Responses:
         ]
         self.of_length = lru_cache(maxsize=64)(self._of_length)
 
-    def transition(self, start: float, end_time: float) -> np.ndarray:
+    def transition(self, start_time: float, end_time: float) -> np.ndarray:
         """Transition matrix E (n + a m, n + a m) over a step from start to end (s)."""
-        motion, inputs = self.of_length(round(end_time - start, 14))
-        driven = self.path(start + (end_time - start) * np.append(UNIT_POINTS, 1.0)) - self.path(start)
+        motion, inputs = self.of_length(round(end_time - start_time, 14))
+        driven = self.path(start_time + (end_time - start_time) * np.append(UNIT_POINTS, 1.0)) - self.path(start_time)
         decay = (power_terms(driven, SERIES_TERMS) @ self.decay).reshape(-1, self.m)
         E = np.zeros((self.n + self.axles * self.m,) * 2)
         E[: self.n, : self.n] = motion

@@ -97,9 +97,9 @@ def check_rates(vehicle: SpatialVehicle, excitation: Excitation, file: str = "")
         )
 
 
-def road_path(excitation: Excitation, speed: float, longest: float) -> RoadPath:
-    """Road path for runs with steps (s) of at most ``longest``; its half steps divide the axle distances."""
-    return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest / 2.0)[0] / speed)
+def road_path(excitation: Excitation, speed: float, longest_step: float) -> RoadPath:
+    """Road path for runs with steps (s) of at most ``longest_step``; its half steps divide the axle distances."""
+    return RoadPath(excitation, speed, path_cell(excitation.lengths, speed * longest_step / 2.0)[0] / speed)
 
 
 def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:

@@ -97,19 +97,19 @@ class Nodes:
 
 def steps(
     profile: SpeedProfile,
-    begin: float,
+    begin_time: float,
     instants: Sequence[float] | np.ndarray,
     motion: float,
     road: float,
     largest_rate_times_step: float,
 ) -> np.ndarray:
-    """Ends (N + 1,) of steps (s) from ``begin`` to the profile's end; its points and ``instants`` are among them.
+    """Ends (N + 1,) of steps (s) from ``begin_time`` to the profile's end; its points and ``instants`` are among them.
 
     A step times the fastest rate of the motion (1/s) and of the road met (``road`` in 1/m) is at most
     ``largest_rate_times_step``.
     """
-    within = [t for t in instants if begin < t < profile.times[-1]]
-    cuts = np.unique(np.concatenate([[begin], profile.times, within]))
+    within = [t for t in instants if begin_time < t < profile.times[-1]]
+    cuts = np.unique(np.concatenate([[begin_time], profile.times, within]))
     ends = [cuts[:1]]
     for start, stop in pairwise(cuts):
         rate = max(motion, road * float(profile.speed(np.array([start, stop])).max()))

@@ -102,14 +102,14 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 
 
 def statistically_linear(
-    vehicle: SpatialVehicle, excitation: Excitation, speed: float, scale: float = 1.0
+    vehicle: SpatialVehicle, excitation: Excitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
     """Linearise the nonlinear springs of a vehicle statistically, on a road at a constant speed (m/s).
 
-    scale : of the travels and rates that the first gains are taken at. Where different ones lead to different fixed
-        points, the vehicle has several ways to move, and no one covariance.
-    InputError for tyres that may lift, which nothing linear stands for.
-    Raises Unstable where a replaced vehicle leaves its equilibrium on its own, RunFailed where no fixed point is found.
+    start_scale : of the travels and rates that the first gains are taken at. Where different ones lead to different
+        fixed points, the vehicle has several ways to move, and no one covariance. InputError for tyres that may lift,
+        which nothing linear stands for. Raises Unstable where a replaced vehicle leaves its equilibrium on its own,
+        RunFailed where no fixed point is found.
     """
     if vehicle.lifts:
         raise InputError(
@@ -118,7 +118,7 @@ def statistically_linear(
             None,
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
-    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(scale)
+    return _Search(vehicle, excitation, speed).iterate_to_fixed_point(start_scale)
 
 
 Law = tuple[float, float, float]
@@ -148,13 +148,13 @@ class _Search:
         with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
         self.rows = np.array([output.displacement_factors for output in with_forces]).reshape(-1, len(self.plain.mass))
 
-    def iterate_to_fixed_point(self, scale: float) -> StatisticallyLinear:
+    def iterate_to_fixed_point(self, start_scale: float) -> StatisticallyLinear:
         """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
         first = _Moments(
             np.zeros(count),
-            np.full(count, scale * FIRST_TRAVEL_DEVIATION),
-            np.full(count, scale * FIRST_RATE_DEVIATION),
+            np.full(count, start_scale * FIRST_TRAVEL_DEVIATION),
+            np.full(count, start_scale * FIRST_RATE_DEVIATION),
         )
         gains, position = self._equivalent_gains(first), np.zeros(len(self.plain.mass))
         changes: list[float] = []

@@ -27,13 +27,15 @@ MOST_POINTS = 5_000_000
 """Longest mirrored road, in points: about 400 MB with its coefficients and the fit."""
 
 
-def continued_road(profile: RoadProfile, rule: str, needed_distance: float, file: object = "") -> RoadProfile:
+def continued_road(
+    profile: RoadProfile, continuation_rule: str, needed_distance: float, file: object = ""
+) -> RoadProfile:
     """Road that reaches at least to ``needed_distance``, or an error; a road that is long enough comes back as it is.
 
     Parameters
     ----------
     profile : any road; one without end is never changed
-    rule : "mirrored" or "refused", see the top of this file
+    continuation_rule : "mirrored" or "refused", see the top of this file
     needed_distance : last arc length that the run reads, m
     file : the user's file, for the message
 
@@ -41,15 +43,17 @@ def continued_road(profile: RoadProfile, rule: str, needed_distance: float, file
     ------
     InputError : unknown rule; the road is too short and the rule is "refused"
     """
-    if rule not in CONTINUATION_RULES:
-        raise InputError(file, "continuation", rule, "must be a rule for what follows a road's end", CONTINUATION_RULES)
+    if continuation_rule not in CONTINUATION_RULES:
+        raise InputError(
+            file, "continuation", continuation_rule, "must be a rule for what follows a road's end", CONTINUATION_RULES
+        )
     if not math.isfinite(needed_distance):
         raise InputError(file, "distance", needed_distance, "must be a finite distance in m")
     if not isinstance(profile, SplineProfile) or needed_distance <= profile.end + OVERRUN_SHARE * (
         profile.end - profile.start
     ):
         return profile
-    if rule == "refused":
+    if continuation_rule == "refused":
         allowed = f"the road ends at s = {profile.end:.6g} m and the run needs {needed_distance:.6g} m"
         raise InputError(file, profile.name, None, f"{allowed}: shorten the run or declare continuation 'mirrored'")
     station, height = _mirrored_points(profile, needed_distance, file)

@@ -52,10 +52,10 @@ class Graded:
         climb_and_slope = self._climb_and_slope(np.asarray(s, dtype=float))
         return height + climb_and_slope[0], slope + climb_and_slope[1]
 
-    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
-        height, slope = self.profile.sample_uniform(start, step, sample_count)
-        climb_and_slope = self._climb_and_slope(start + step * np.arange(sample_count))
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
+        height, slope = self.profile.sample_uniform(start_station, step, sample_count)
+        climb_and_slope = self._climb_and_slope(start_station + step * np.arange(sample_count))
         return height + climb_and_slope[0], slope + climb_and_slope[1]
 
     def height_slope_at(self, s: float) -> tuple[float, float]:

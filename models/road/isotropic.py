@@ -91,9 +91,9 @@ def isotropic_like(road: TwoTrackRoad, y: float) -> IsotropicRoad:
     )
 
 
-def isotropic_class(road_class: str, corner: float = 0.0, level: str = "one-sided") -> IsotropicRoad:
+def isotropic_class(road_class: str, corner: float = 0.0, level_convention: str = "one-sided") -> IsotropicRoad:
     """Isotropic road at the mean of an ISO 8608 class, levelled off below the corner (rad/m)."""
-    return IsotropicRoad((DensityPart(level_of_class(road_class, level), corner),))
+    return IsotropicRoad((DensityPart(level_of_class(road_class, level_convention), corner),))
 
 
 def cross_spectrum_of(covariance: Callable[[float], float], wavenumber: Sequence[float], distance: float) -> np.ndarray:

@@ -90,8 +90,8 @@ def _rotate_waves(sine, cosine, turn_sine, turn_cosine, wavenumber):
 
 
 @njit(cache=True)
-def sines_uniform(start, step, waves, height, slope):
-    """Fill ``height`` and ``slope`` at ``start + j step`` by complex rotation, exact every 128 samples."""
+def sines_uniform(start_station, step, waves, height, slope):
+    """Fill ``height`` and ``slope`` at ``start_station + j step`` by complex rotation, exact every 128 samples."""
     amplitude, wavenumber, phase, window = waves
     n = amplitude.size
     work = np.zeros((5, (n + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES))
@@ -100,20 +100,20 @@ def sines_uniform(start, step, waves, height, slope):
         number[i] = wavenumber[i]
         turn_sine[i], turn_cosine[i] = math.sin(number[i] * step), math.cos(number[i] * step)
     for first in range(0, height.size, RESYNCHRONISE):
-        s = start + first * step
+        s = start_station + first * step
         for i in range(n):
             angle = number[i] * s + phase[i]
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
         for j in range(first, min(first + RESYNCHRONISE, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
-            height[j], slope[j] = faded_in(start + j * step, window, value, rate)
+            height[j], slope[j] = faded_in(start_station + j * step, window, value, rate)
 
 
 @njit(cache=True)
-def segment(stations, s, guess):
-    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guess``."""
+def segment(stations, s, guessed_piece):
+    """Index of the piece that contains ``s``; the search starts at the piece found last, ``guessed_piece``."""
     last_piece = stations.size - 2
-    for i in range(guess, min(guess + 2, last_piece + 1)):
+    for i in range(guessed_piece, min(guessed_piece + 2, last_piece + 1)):
         if stations[i] <= s < stations[i + 1]:
             return i
     low, high = 0, last_piece
@@ -155,10 +155,10 @@ def fill_cubics(s, stations, coefficients, window, height, slope):
 
 
 @njit(cache=True)
-def cubics_uniform(start, step, stations, coefficients, window, height, slope):
-    """Fill ``height`` and ``slope`` at ``start + j step``."""
+def cubics_uniform(start_station, step, stations, coefficients, window, height, slope):
+    """Fill ``height`` and ``slope`` at ``start_station + j step``."""
     piece = 0
     for j in range(height.size):
-        s = start + j * step
+        s = start_station + j * step
         piece = segment(stations, s, piece)
         height[j], slope[j] = cubic_at(s, piece, stations, coefficients, window)

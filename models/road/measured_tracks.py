@@ -58,31 +58,31 @@ class TrackSpectra:
         """|S_lr| / sqrt(S_l S_r), biased up: pure chance gives about sqrt(2 / freedom)."""
         return np.abs(self.cross) / np.sqrt(self.left * self.right)
 
-    def confidence_factors(self, level: float = 0.95) -> tuple[float, float]:
-        """Factors by which to multiply a density to get its confidence interval at probability ``level``."""
+    def confidence_factors(self, probability: float = 0.95) -> tuple[float, float]:
+        """Factors by which to multiply a density to get its confidence interval at probability ``probability``."""
         from scipy.stats import chi2
 
-        low, high = chi2.ppf([(1.0 - level) / 2.0, (1.0 + level) / 2.0], self.degrees_of_freedom)
+        low, high = chi2.ppf([(1.0 - probability) / 2.0, (1.0 + probability) / 2.0], self.degrees_of_freedom)
         return self.degrees_of_freedom / high, self.degrees_of_freedom / low
 
-    def chance_coherency(self, level: float = 0.95) -> float:
-        """Coherency that two unrelated tracks do not exceed by chance, with probability ``level``."""
+    def chance_coherency(self, probability: float = 0.95) -> float:
+        """Coherency that two unrelated tracks do not exceed by chance, with probability ``probability``."""
         independent = self.degrees_of_freedom / 2.0
-        return math.sqrt(1.0 - (1.0 - level) ** (1.0 / (independent - 1.0)))
+        return math.sqrt(1.0 - (1.0 - probability) ** (1.0 / (independent - 1.0)))
 
 
 def read_tracks(
     path: str | Path,
     track_width: float = TRACK_WIDTH,
     *,
-    offset: float = 0.0,
+    lateral_offset: float = 0.0,
     first_station: float | None = None,
     last_station: float | None = None,
 ) -> MeasuredTracks:
     """Left and right track of an OpenCRG or CSV road, from ``first_station`` to ``last_station`` (m along the road).
 
-    track_width : m between the tracks; a CSV file does not tell it. offset : m, of their middle, to the left; OpenCRG
-    only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
+    track_width : m between the tracks; a CSV file does not tell it. lateral_offset : m, of their middle, to the left;
+    OpenCRG only. Heights between unevenly spaced stations come from the reader's spline, at the smallest spacing.
 
     Raises
     ------
@@ -94,7 +94,10 @@ def read_tracks(
     if suffix == ".csv":
         left, right = read_csv_tracks(path)
     elif suffix == ".crg":
-        left, right = (read_opencrg(path, side, offset=offset, track_width=track_width) for side in ("left", "right"))
+        left, right = (
+            read_opencrg(path, side, lateral_offset=lateral_offset, track_width=track_width)
+            for side in ("left", "right")
+        )
     else:
         raise InputError(path, "", None, "must be a road in OpenCRG (.crg) or in CSV (.csv)")
     start, end = (

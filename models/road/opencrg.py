@@ -48,7 +48,7 @@ class _Promise:
 
 
 def read_opencrg(
-    path: str | Path, track: str = "mean", *, offset: float = 0.0, track_width: float = TRACK_WIDTH
+    path: str | Path, track: str = "mean", *, lateral_offset: float = 0.0, track_width: float = TRACK_WIDTH
 ) -> SplineProfile:
     """C2 road along one track of an OpenCRG file.
 
@@ -57,7 +57,7 @@ def read_opencrg(
     path : file of any of the formats KRBI, KDBI, LRFI, LDFI
     track : "left" and "right" lie at v = offset +- track_width / 2, "centre" at v = offset, and "mean" is
         the mean height of left and right; between two long sections the height is linear in v
-    offset, track_width : m; v is positive to the left of the reference line
+    lateral_offset, track_width : m; v is positive to the left of the reference line
 
     Returns
     -------
@@ -71,7 +71,7 @@ def read_opencrg(
     if track not in _LATERAL_POSITIONS:
         raise InputError(path, "track", track, "must be a track", tuple(_LATERAL_POSITIONS))
     road = _load(path)
-    lines = [_heights_at(path, road, offset + side * track_width) for side in _LATERAL_POSITIONS[track]]
+    lines = [_heights_at(path, road, lateral_offset + side * track_width) for side in _LATERAL_POSITIONS[track]]
     heights_up = lines[0] if len(lines) == 1 else 0.5 * (lines[0] + lines[1])
     if heights_up.size < 4:
         raise InputError(path, "cross sections", heights_up.size, "at least 4 are needed")

@@ -43,8 +43,8 @@ class RoadProfile(Protocol):
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         ...
 
-    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
         ...
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -105,16 +105,16 @@ class SineProfile:
         kernels.fill_sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1.
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1.
 
         Agrees with :meth:`height_and_slope` to about 1e-14 of the sum of the amplitudes (slopes: of the
         sum of amplitude times wavenumber), as long as the rounding of s itself, 1e-16 of s times the
         wavenumber, stays below that.
         """
-        start, step = _checked_number(start, "start"), _checked_number(step, "step")
+        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
         height, slope = np.empty(sample_count), np.empty(sample_count)
-        kernels.sines_uniform(start, step, self.waves, height, slope)
+        kernels.sines_uniform(start_station, step, self.waves, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -206,14 +206,14 @@ class SplineProfile:
         kernels.fill_cubics(flat, self.station, self.coefficients, self.window_length, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
-    def sample_uniform(self, start: float, step: float, sample_count: int) -> HeightsAndSlopes:
-        """Heights (m, positive down) and slopes at ``start + j step`` (m), j = 0 .. count - 1."""
-        start, step = _checked_number(start, "start"), _checked_number(step, "step")
-        last_station = start + max(sample_count - 1, 0) * step
-        self._check_extent(min(start, last_station), max(start, last_station))
+    def sample_uniform(self, start_station: float, step: float, sample_count: int) -> HeightsAndSlopes:
+        """Heights (m, positive down) and slopes at ``start_station + j step`` (m), j = 0 .. count - 1."""
+        start_station, step = _checked_number(start_station, "start"), _checked_number(step, "step")
+        last_station = start_station + max(sample_count - 1, 0) * step
+        self._check_extent(min(start_station, last_station), max(start_station, last_station))
         height, slope = np.empty(sample_count), np.empty(sample_count)
         road = (self.station, self.coefficients, self.window_length)
-        kernels.cubics_uniform(start, step, *road, height, slope)
+        kernels.cubics_uniform(start_station, step, *road, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
@@ -250,10 +250,10 @@ def _flat_stations(s: ArrayLike) -> tuple[np.ndarray, tuple[int, ...]]:
     return np.ascontiguousarray(array).reshape(-1), array.shape
 
 
-def _checked_number(value: float, field: str) -> float:
-    if not math.isfinite(value):
-        raise InputError("", field, value, "must be a finite number")
-    return float(value)
+def _checked_number(number: float, field: str) -> float:
+    if not math.isfinite(number):
+        raise InputError("", field, number, "must be a finite number")
+    return float(number)
 
 
 def _checked_window(length: float) -> float:

@@ -29,11 +29,13 @@ class RoadUnderWheels:
         wavelength."""
         return self.profile.finest / self.speed
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start + i step, shape (sample_count, 4)."""
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step, shape (sample_count, 4)."""
         values_out = np.empty((sample_count, 4))
         for wheel, behind in enumerate((0.0, self.wheelbase)):
-            height, slope = self.profile.sample_uniform(self.speed * start - behind, self.speed * step, sample_count)
+            height, slope = self.profile.sample_uniform(
+                self.speed * start_time - behind, self.speed * step, sample_count
+            )
             values_out[:, wheel], values_out[:, 2 + wheel] = height, self.speed * slope
         return values_out
 

@@ -83,7 +83,7 @@ class TwoTrackRoad:
 
 def road_of_level(
     half_track: float,
-    level: float = TRACK_DENSITY_LEVEL,
+    density_level: float = TRACK_DENSITY_LEVEL,
     *,
     corners: tuple[float, float] = (MEAN_CORNER, ROLL_CORNER),
     cutoff: float | None = None,
@@ -95,7 +95,7 @@ def road_of_level(
     """
     if not (math.isfinite(half_track) and half_track > 0.0):
         raise InputError("", "half_track", half_track, "must be above 0, in m: half the distance of the two tracks")
-    half = math.pi * level
+    half = math.pi * density_level
     return TwoTrackRoad(ShapeFilter(corners[0], half, cutoff), ShapeFilter(corners[1], half / half_track**2, cutoff))
 
 
@@ -198,6 +198,6 @@ def _axle_distances(wheels: Sequence[WheelPosition]) -> tuple[float, ...]:
     return behind
 
 
-def _check_word(option_name: str, word: str, allowed_words: tuple[str, ...]) -> None:
-    if word not in allowed_words:
-        raise InputError("", option_name, word, "must say how the wheels' roads go together", allowed_words)
+def _check_word(option_name: str, chosen_word: str, allowed_words: tuple[str, ...]) -> None:
+    if chosen_word not in allowed_words:
+        raise InputError("", option_name, chosen_word, "must say how the wheels' roads go together", allowed_words)

@@ -33,21 +33,26 @@ def random_walk(deviation: float, rate: float) -> float:
 
 
 def measured_attitude(
-    rates: np.ndarray, sample_period: float, deviation: np.ndarray, start: np.ndarray, paths: range, seed: int = 0
+    rates: np.ndarray,
+    sample_period: float,
+    deviation: np.ndarray,
+    start_attitude: np.ndarray,
+    paths: range,
+    seed: int = 0,
 ) -> np.ndarray:
     """Quaternions (n + 1, paths, 4) of the attitude from noisy rates, which are held over each period and integrated by
     exact rotations.
 
     rates : true local rates (n, 3) in rad/s, one for each period (s); deviation : (3,) in rad/s per sample, each axis
-    its own; start : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
+    its own; start_attitude : the true attitude (4,) at t = 0. Path i draws from the stream (seed, i).
     """
     noise = np.stack([normal_samples(seed, path, len(rates), 3, source=GYRO) for path in paths], axis=1)
-    return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start)
+    return true_attitude(rates[:, None, :] + deviation * noise, sample_period, start_attitude)
 
 
-def true_attitude(rates: np.ndarray, sample_period: float, start: np.ndarray) -> np.ndarray:
+def true_attitude(rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
     """Quaternions (n + 1, ..., 4) of rates (n, ..., 3) in rad/s that are constant over each period (s), exactly."""
-    return integrate(np.concatenate([rates, rates[-1:]]), sample_period, start, "held")
+    return integrate(np.concatenate([rates, rates[-1:]]), sample_period, start_attitude, "held")
 
 
 def error_rotation(measured: np.ndarray, true_attitudes: np.ndarray) -> np.ndarray:
@@ -73,7 +78,7 @@ def mean_trace(angle_random_walk: float, time: float) -> float:
     return float(3 * np.exp(-(angle_random_walk**2) * time))
 
 
-def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start: np.ndarray) -> np.ndarray:
+def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start_attitude: np.ndarray) -> np.ndarray:
     """E[E] (3, 3) for unequal noise on a turning body: the mean rotation matrix of the error.
 
     From Stratonovich to Ito the noise leaves 1/2 sum s_i^2 G_i^2, with G_i the generator of a turn about local axis
@@ -83,10 +88,10 @@ def mean_error(walks: np.ndarray, rates: np.ndarray, sample_period: float, start
     G_i^2). The latter has constant coefficients over each period and is stepped by its matrix exponential: exact for
     rates that are held. walks : (3,) in rad per sqrt(s); rates (n, 3) in rad/s, local; sample_period s; start (4,).
     """
-    mean = rotation_matrix(start)
+    mean = rotation_matrix(start_attitude)
     for step in _exponentials((skew_matrix(rates) + noise_decay_matrix(walks)) * sample_period):
         mean = mean @ step
-    return mean @ rotation_matrix(true_attitude(rates, sample_period, start)[-1]).T
+    return mean @ rotation_matrix(true_attitude(rates, sample_period, start_attitude)[-1]).T
 
 
 def _exponentials(m: np.ndarray) -> np.ndarray:
@@ -120,10 +125,10 @@ def euler_mean_square(angle_random_walk: float, axes: int, sample_period: float,
     return float(np.exp(steps * np.log1p(axes * angle_random_walk**2 * sample_period / 4)))
 
 
-def euler_quaternions(turns: np.ndarray, start: np.ndarray) -> np.ndarray:
+def euler_quaternions(turn_vectors: np.ndarray, start_attitude: np.ndarray) -> np.ndarray:
     """Explicit Euler on eq. (25), never normalised: quaternions (paths, 4) after turns (n, paths, 3) in rad."""
-    q = np.broadcast_to(np.asarray(start, dtype=float), (turns.shape[1], 4))
-    for turn in turns:
+    q = np.broadcast_to(np.asarray(start_attitude, dtype=float), (turn_vectors.shape[1], 4))
+    for turn in turn_vectors:
         q = q + 0.5 * quaternion_product(q, np.concatenate([np.zeros((len(q), 1)), turn], axis=1))
     return q
 

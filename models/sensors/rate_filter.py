@@ -26,11 +26,11 @@ class _Rates(ExtendedKalmanFilter):
 
 
 def filter_rates(
-    spins: Spin, sample_period: float, start: np.ndarray, noise: float, deviation: float = 0.0
+    spins: Spin, sample_period: float, start_rates: np.ndarray, noise: float, deviation: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
 
-    start : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
+    start_rates : (3,) rad/s at the first sample, known to ``deviation`` (rad/s); noise : standard deviation of each
     reading (m/s^2), white. The same readings make the prediction and the measurement, two correlations that the
     filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
     """
@@ -43,7 +43,7 @@ def filter_rates(
     pairs = SYMMETRIC_ENTRIES[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
-    filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * UNIT_MATRIX
+    filter_.x, filter_.P = np.asarray(start_rates) @ frame, deviation**2 * UNIT_MATRIX
     filter_.Q = np.diag((sample_period * noise * spins.array.own_gains(planar)) ** 2)
     squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]

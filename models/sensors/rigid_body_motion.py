@@ -253,15 +253,16 @@ def _quality_without(array: SensorArray, readings: np.ndarray, name: str, noise:
     return _quality_of(remaining_array, readings[:, keep], noise)
 
 
-def time_integral(values: np.ndarray, sample_period: float, start: np.ndarray) -> np.ndarray:
-    """Sum of ``start`` and the time integral of values (n, ...), by cubics through four neighbouring samples: order 4
-    in the period."""
-    return start + np.concatenate(
+def time_integral(values: np.ndarray, sample_period: float, start_values: np.ndarray) -> np.ndarray:
+    """Sum of ``start_values`` and the time integral of values (n, ...), by cubics through four neighbouring samples:
+    order 4 in the period.
+    """
+    return start_values + np.concatenate(
         [np.zeros_like(values[:1]), np.cumsum(cubic_integrals(values, sample_period), axis=0)]
     )
 
 
-def integrate_rates(spins: Spin, sample_period: float, start: np.ndarray) -> np.ndarray:
+def integrate_rates(spins: Spin, sample_period: float, start_rates: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
 
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
@@ -269,7 +270,7 @@ def integrate_rates(spins: Spin, sample_period: float, start: np.ndarray) -> np.
     """
     if len(spins.rate_matrix) < 4:
         raise InputError("", "readings", len(spins.rate_matrix), "at least four samples are needed to integrate them")
-    first = np.asarray(start) @ spins.array.frame
+    first = np.asarray(start_rates) @ spins.array.frame
     if not spins.array.planar:
         return time_integral(own_acceleration(spins, np.zeros((1, 3))), sample_period, first) @ spins.array.frame.T
     m = spins.rate_matrix
@@ -283,7 +284,7 @@ def recovered_motion(
     array: SensorArray,
     readings: np.ndarray,
     sample_period: float,
-    start: StartState | None = None,
+    start_state: StartState | None = None,
     zeroed: bool = False,
     rates: np.ndarray | None = None,
     cut_offs: CutOffs | None = None,
@@ -295,11 +296,11 @@ def recovered_motion(
     rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
-    start, cut_offs = start or StartState(), cut_offs or CutOffs()
+    start_state, cut_offs = start_state or StartState(), cut_offs or CutOffs()
     spins = spin_from_readings(array, readings)
-    w = integrate_rates(spins, sample_period, np.array(start.rates)) if rates is None else rates
+    w = integrate_rates(spins, sample_period, np.array(start_state.rates)) if rates is None else rates
     w = _high_passed(w, sample_period, cut_offs.turning)
-    orientation = integrate(w, sample_period, np.array(start.orientation))
+    orientation = integrate(w, sample_period, np.array(start_state.orientation))
     if cut_offs.turning is not None:
         orientation = from_cardan(
             *high_pass(np.unwrap(cardan_angles(orientation), axis=0), sample_period, cut_offs.turning).T
@@ -310,10 +311,10 @@ def recovered_motion(
         array, readings - gravity_vector if zeroed else readings, orientation, alpha, w, gravity_vector
     )
     velocity = _high_passed(
-        time_integral(acceleration, sample_period, np.array(start.velocity)), sample_period, cut_offs.position
+        time_integral(acceleration, sample_period, np.array(start_state.velocity)), sample_period, cut_offs.position
     )
     position = _high_passed(
-        time_integral(velocity, sample_period, np.array(start.position)), sample_period, cut_offs.position
+        time_integral(velocity, sample_period, np.array(start_state.position)), sample_period, cut_offs.position
     )
     return RecoveredMotion(alpha, w, orientation, acceleration, velocity, position)
 

@@ -141,8 +141,8 @@ NAMED_SURFACES: dict[str, tuple[PureSlipCurve, PureSlipCurve]] = {
 """All surfaces that have a name, along and across."""
 
 
-def table_of_surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
-    """Table of one of ``NAMED_SURFACES``, its friction times ``scale`` at a load (N).
+def table_of_surface(name: str, friction_scale: float = 1.0, load: float = 1e4, fall: float = 0.0) -> TyreTable:
+    """Table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
 
     fall : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
     quarter of it to twice it, and constant beyond.
@@ -155,7 +155,7 @@ def table_of_surface(name: str, scale: float = 1.0, load: float = 1e4, fall: flo
     loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])
 
     def load_factor(load_there: float) -> float:
-        return scale * (1.0 - fall * (load_there / load - 1.0))
+        return friction_scale * (1.0 - fall * (load_there / load - 1.0))
 
     return by_similarity(
         lambda k, load_there: load_factor(load_there) * law_along(k),

@@ -80,8 +80,10 @@ def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.nda
             raise _error_in_row(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
 
 
-def _error_in_row(path: str | Path, lines: np.ndarray, name: str, row: int, value: float, allowed: str) -> InputError:
-    return InputError(path, f"line {lines[row]}, column {name!r}", float(value), f"{allowed} (in SI units)")
+def _error_in_row(
+    path: str | Path, lines: np.ndarray, name: str, row: int, wrong_value: float, allowed: str
+) -> InputError:
+    return InputError(path, f"line {lines[row]}, column {name!r}", float(wrong_value), f"{allowed} (in SI units)")
 
 
 def _row_of_each(path: str | Path, lines: np.ndarray, combination_number: np.ndarray, axes: list) -> np.ndarray:

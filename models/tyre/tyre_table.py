@@ -182,22 +182,22 @@ def stacked_tables(tables: Sequence[TyreTable]) -> Tables:
 
 
 @lean
-def cell_and_share(nodes, value):
+def cell_and_share(nodes, node_value):
     """Index of the table cell that contains a value, and the value's relative position in the cell; clamped at the
     ends."""
     last_node = nodes.size - 1
-    if last_node == 0 or value <= nodes[0]:
+    if last_node == 0 or node_value <= nodes[0]:
         return 0, 0.0
-    if value >= nodes[last_node]:
+    if node_value >= nodes[last_node]:
         return last_node - 1, 1.0
     low, high = 0, last_node
     while high - low > 1:
         middle = (low + high) // 2
-        if nodes[middle] <= value:
+        if nodes[middle] <= node_value:
             low = middle
         else:
             high = middle
-    return low, (value - nodes[low]) / (nodes[low + 1] - nodes[low])
+    return low, (node_value - nodes[low]) / (nodes[low + 1] - nodes[low])
 
 
 @lean

@@ -184,9 +184,11 @@ def _by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quant
     ]
 
 
-def _missing_channel_notes(source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]) -> Iterator[str]:
+def _missing_channel_notes(
+    measurement_source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]
+) -> Iterator[str]:
     """Channels of the file that the run does not have, each with the nearest name."""
-    for channel in source.channels:
+    for channel in measurement_source.channels:
         if not _by_engine(channel.name, engines, run_quantities):
             yield (
                 f"not compared: {channel.name!r} is no channel of the "
@@ -194,17 +196,17 @@ def _missing_channel_notes(source: Source, run_quantities: Mapping[str, Quantity
             )
 
 
-def _channel_pair(source: Source, channel: Channel, run_quantity: Quantity) -> ChannelPair:
+def _channel_pair(measurement_source: Source, channel: Channel, run_quantity: Quantity) -> ChannelPair:
     """Times and values of one channel in the run and in the measurement, both in the run's unit."""
     if not channel.unit and run_quantity.unit not in ("", "-"):
         allowed = f"has no unit: write {channel.name} [{run_quantity.unit}] in the header, or its unit there"
-        raise InputError(source.path, channel.name, None, allowed)
-    factor = factor_between(channel.unit, run_quantity.unit, source.path, channel.name)
-    blocks = list(source.blocks([channel.name]))
+        raise InputError(measurement_source.path, channel.name, None, allowed)
+    factor = factor_between(channel.unit, run_quantity.unit, measurement_source.path, channel.name)
+    blocks = list(measurement_source.blocks([channel.name]))
     sample_times, values = (
         np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True)
     )
-    clock = sample_timing(sample_times, str(source.path), (channel.name,))
+    clock = sample_timing(sample_times, str(measurement_source.path), (channel.name,))
     return ChannelPair(
         run_quantity.grid,
         run_quantity.values,

@@ -157,8 +157,8 @@ def correlation(uncertainty: Uncertainty) -> np.ndarray:
     return np.divide(uncertainty.covariance, outer, out=np.zeros_like(outer), where=outer > 0.0)
 
 
-def _finite_number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _finite_number(number: float) -> float | None:
+    return float(number) if np.isfinite(number) else None
 
 
 def relative_errors(fit: Fit) -> dict[str, float]:
@@ -218,11 +218,11 @@ def late_clock(uncertainty: Uncertainty) -> float:
     return shift if _mean_distance(pairs, shift) * SHIFT_IMPROVEMENT < _mean_distance(pairs, 0.0) else 0.0
 
 
-def _mean_distance(pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
+def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
     """Mean over channels of rms difference / standard deviation of the measurement, with the measurement shifted
     earlier by a time (s)."""
     shares = []
-    for pair in pairs:
+    for pair in channel_pairs:
         shifted_times = pair.times - time_shift_seconds
         is_within = (
             np.isfinite(pair.values) & (shifted_times >= pair.run_times[0]) & (shifted_times <= pair.run_times[-1])

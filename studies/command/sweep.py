@@ -187,15 +187,15 @@ def _listed_values(list_text: str) -> tuple[Any, ...]:
         return tuple(word.strip() for word in list_text.split(","))
 
 
-def _value_text(value: Any) -> str:
+def _value_text(summary_value: Any) -> str:
     """The value as a scene file would hold it."""
-    return json.dumps(value, ensure_ascii=False, default=str)
+    return json.dumps(summary_value, ensure_ascii=False, default=str)
 
 
-def _is_writable(value: Any) -> bool:
+def _is_writable(summary_value: Any) -> bool:
     """Whether a scene file can represent this value exactly."""
     try:
-        return bool(tomllib.loads(f"x = {_value_text(value)}")["x"] == value)
+        return bool(tomllib.loads(f"x = {_value_text(summary_value)}")["x"] == summary_value)
     except ValueError:
         return False
 

@@ -102,15 +102,15 @@ def _shaded_triangles(
 
 
 @njit(cache=True, error_model="numpy")
-def columns_within(start, growth, left_column, right_column):
+def columns_within(start_value, growth, left_column, right_column):
     """First and last column between ``left_column`` and ``right_column`` for which start + column * growth is not
     negative; the first is greater than the last where there is no such column.
     """
     if growth > 0.0:
-        return max(left_column, -start / growth), right_column
+        return max(left_column, -start_value / growth), right_column
     if growth < 0.0:
-        return left_column, min(right_column, -start / growth)
-    return left_column, right_column if start >= 0.0 else left_column - 1.0
+        return left_column, min(right_column, -start_value / growth)
+    return left_column, right_column if start_value >= 0.0 else left_column - 1.0
 
 
 @njit(cache=True, error_model="numpy")

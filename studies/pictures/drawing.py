@@ -65,5 +65,5 @@ def drawn_pose(motion: FilmedMotion, stage: Stage, body: str, k: int) -> tuple[n
     return position, _magnified_turn(Rotation.from_matrix(turn), stage.magnification)
 
 
-def _magnified_turn(turn: Rotation, magnification: float) -> np.ndarray:
-    return Rotation.from_rotvec(magnification * turn.as_rotvec()).as_matrix()
+def _magnified_turn(rotation: Rotation, magnification: float) -> np.ndarray:
+    return Rotation.from_rotvec(magnification * rotation.as_rotvec()).as_matrix()

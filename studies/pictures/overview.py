@@ -149,8 +149,10 @@ def _draw_overview(axis: Any) -> None:
     _draw_box(axis, (20.7, 2.1), 6.0, "one result: compared,\nits error and its price", DARK, 1.7)
 
 
-def _draw_arrow(axis: Any, start: tuple[float, float], end_point: tuple[float, float], colour: str) -> None:
-    axis.add_patch(FancyArrowPatch(start, end_point, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4))
+def _draw_arrow(axis: Any, start_point: tuple[float, float], end_point: tuple[float, float], colour: str) -> None:
+    axis.add_patch(
+        FancyArrowPatch(start_point, end_point, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4)
+    )
 
 
 def _draw_box(

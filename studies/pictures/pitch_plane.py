@@ -67,10 +67,10 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
 
     mbs, nodes = model.built.mbs, model.built.nodes
 
-    def ask(node: Any, kind: Any) -> Any:
+    def ask(node: Any, output_kind: Any) -> Any:
         point = mbs.GetNode(node)["nodeType"] == "Point2D"
-        asks_rotation = kind == exu.OutputVariableType.RotationMatrix
-        return np.eye(3) if point and asks_rotation else mbs.GetNodeOutput(node, kind)
+        asks_rotation = output_kind == exu.OutputVariableType.RotationMatrix
+        return np.eye(3) if point and asks_rotation else mbs.GetNodeOutput(node, output_kind)
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states

@@ -109,13 +109,13 @@ def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Po
 
 
 def _road_force_arrow(
-    kind: str, vehicle: SpatialVehicle, tyre_or_force: Any, force: np.ndarray, axis: int, poses: Poses
+    arrow_kind: str, vehicle: SpatialVehicle, tyre_or_force: Any, force: np.ndarray, axis: int, poses: Poses
 ) -> Arrow:
     """Arrow of a tyre force or side force (f,) along one axis of space. It starts on the road below the force's point
     on its body."""
     (x, y, _), body = tyre_or_force.point, tyre_or_force.body
     points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
-    return Arrow(f"{kind}, {tyre_or_force.name}", kind, body, points, force[:, None] * np.eye(3)[axis])
+    return Arrow(f"{arrow_kind}, {tyre_or_force.name}", arrow_kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:

@@ -25,9 +25,9 @@ class PaintedSurface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, offset: np.ndarray, turn: np.ndarray) -> "PaintedSurface":
-        """The surface after turning by ``turn`` (3, 3) and shifting by ``offset`` (3,)."""
-        return replace(self, corners=self.corners @ turn.T + offset, normals=self.normals @ turn.T)
+    def moved(self, shift: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
+        """The surface after turning by ``rotation`` (3, 3) and shifting by ``shift`` (3,)."""
+        return replace(self, corners=self.corners @ rotation.T + shift, normals=self.normals @ rotation.T)
 
     def at(self, *shift: float) -> "PaintedSurface":
         """The surface shifted."""
@@ -115,26 +115,26 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
 
 
 def line_solid(
-    tail: np.ndarray, head_point: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
+    tail_point: np.ndarray, head_point: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
 ) -> PaintedSurface:
     """A solid of revolution whose axis runs from one point (tail) to another (head); ``axial`` : positions from the
     tail (m)."""
-    direction = (head_point - tail) / np.linalg.norm(head_point - tail)
+    direction = (head_point - tail_point) / np.linalg.norm(head_point - tail_point)
     perpendicular = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     perpendicular /= np.linalg.norm(perpendicular)
     turn = np.column_stack([perpendicular, direction, np.cross(perpendicular, direction)])
-    return surface_of_revolution(axial, radii, colour, 16).moved(tail, turn)
+    return surface_of_revolution(axial, radii, colour, 16).moved(tail_point, turn)
 
 
-def rod(tail: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
+def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
     """A round rod from one point to another."""
-    length = float(np.linalg.norm(head_point - tail))
+    length = float(np.linalg.norm(head_point - tail_point))
     return line_solid(
-        tail, head_point, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour
+        tail_point, head_point, np.array([0.0, 0.0, length, length]), radius * np.array([0.0, 1.0, 1.0, 0.0]), colour
     )
 
 
-def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
+def arrow(tail_point: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
     """An arrow as long as the vector (m); None if it is shorter than a tenth of its thickness."""
     length = float(np.linalg.norm(vector))
     if length < 0.1 * thickness:
@@ -142,4 +142,4 @@ def arrow(tail: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour
     head = min(2.6 * thickness, length)
     axial = np.array([0.0, 0.0, length - head, length - head, length])
     radii = thickness * min(1.0, length / (2.6 * thickness)) * np.array([0.0, 0.35, 0.35, 1.0, 0.0])
-    return line_solid(tail, tail + vector, axial, radii, colour)
+    return line_solid(tail_point, tail_point + vector, axial, radii, colour)

@@ -102,7 +102,7 @@ def step_workspace() -> Known:
 
 
 @inlined
-def settle(truck_state, regular, starts, truck, workspace):
+def settle(truck_state, regularising_speed, starts, truck, workspace):
     """Compute each wheel's velocity, slip angle, heading and lever arms from the truck's state, and store them in
     ``workspace``."""
     x, y, angles = truck.x, truck.y, truck.tables.angles
@@ -118,7 +118,7 @@ def settle(truck_state, regular, starts, truck, workspace):
         if starts:
             workspace.start[i] = u
         forwards = u if workspace.start[i] >= 0.0 else -u
-        angle = math.atan2(abs(v), max(forwards, regular))
+        angle = math.atan2(abs(v), max(forwards, regularising_speed))
         workspace.rate[i], workspace.along[i], workspace.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
         workspace.angle[i] = angle
         workspace.cell[i], workspace.share[i] = cell_and_share(angles, angle)

@@ -26,17 +26,17 @@ CALLS_PER_TURN = 200
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def forces(axis, limit, creepage_along, creepage_across, halves, shares, bound):
+def forces(axis, friction_limit, creepage_along, creepage_across, halves, shares, bound):
     """Creep forces fx, fy (N) on a circular contact area of radius ``axis`` (m).
 
-    limit : friction by load (N); creepage_along, creepage_across : creepages by their flexibilities (N/m^3); halves,
-    shares (n,) : half length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear
-    divided by that in the strip's middle
+    friction_limit : friction by load (N); creepage_along, creepage_across : creepages by their flexibilities (N/m^3);
+    halves, shares (n,) : half length of a strip by the axis, share of the load; bound (cells,) : traction that a cell
+    may bear divided by that in the strip's middle
     """
     cells, count, fx, fy = bound.size, halves.size, 0.0, 0.0
     for k in range(count):
         half, share = halves[k], shares[k]
-        middle = limit * share / half * cells * count / (4.0 * axis * axis)
+        middle = friction_limit * share / half * cells * count / (4.0 * axis * axis)
         step = 2.0 * axis * half / cells / middle
         u, v, x, y, sum_x, sum_y = step * creepage_along, step * creepage_across, 0.0, 0.0, 0.0, 0.0
         for i in range(cells):
@@ -46,7 +46,7 @@ def forces(axis, limit, creepage_along, creepage_across, halves, shares, bound):
                 x, y = x * bound[i] / size, y * bound[i] / size
             sum_x, sum_y = sum_x + x, sum_y + y
         fx, fy = fx + share * sum_x, fy + share * sum_y
-    return limit * fx, limit * fy
+    return friction_limit * fx, friction_limit * fy
 
 
 def contact_jobs() -> tuple[Callable[[], Array], Callable[[], Array]]:

@@ -162,9 +162,9 @@ def _road_law() -> Any:
     time = offset("mjData", "time")
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, data):
-        numbers, forces = array_at(model, numeric), array_at(data, passive)
-        row = 2 + 4 * int(np.rint(double_at(data, time)[0] * numbers[0]))
+    def law(model, case_data):
+        numbers, forces = array_at(model, numeric), array_at(case_data, passive)
+        row = 2 + 4 * int(np.rint(double_at(case_data, time)[0] * numbers[0]))
         for i in range(4):
             forces[3 + i] += numbers[1] * numbers[row + i]
 

@@ -61,10 +61,12 @@ def ratio_of_wheelsets(steps: int, round_count: int) -> tuple[float, tuple[float
 
 
 def arrays_per_steps(
-    job: Callable[[int], Callable[[], Any]], short: int = SHORT_RUN_STEPS, long: int = 10 * SHORT_RUN_STEPS
+    job: Callable[[int], Callable[[], Any]], short_steps: int = SHORT_RUN_STEPS, long_steps: int = 10 * SHORT_RUN_STEPS
 ) -> int:
-    """How many more arrays a job allocates in ``long`` steps than in ``short`` ones; ``job(steps)`` builds the job."""
-    jobs = [job(steps) for steps in (short, long)]
+    """How many more arrays a job allocates in ``long_steps`` steps than in ``short_steps`` ones; ``job(steps)`` builds
+    the job.
+    """
+    jobs = [job(steps) for steps in (short_steps, long_steps)]
     for warm in jobs:
         warm()
     arrays_of_short, arrays_of_long = map(allocated_arrays, jobs)

@@ -205,10 +205,10 @@ class _Reading:
             raise joint.refuse(", FUNCTION", length, f"must be above 0 and the distance at the start, {distance:g} m")
         return "distance", ends, distance
 
-    def _spring(self, statement: Statement, kind: Kind, joint: Marker) -> Spring:
+    def _spring(self, statement: Statement, joint_kind: Kind, joint: Marker) -> Spring:
         ground, body = self.pair(statement, statement.whole("I"), statement.whole("J"))
         turns = statement.has("ROTATIONAL") or statement.has("ROTATION")
-        if turns and not (kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
+        if turns and not (joint_kind == "revolute" and _are_parallel(ground.axes[:, 2], joint.axes[:, 2])):
             raise statement.refuse("", None, "turns about an axis that no revolute joint has: not supported")
         law = self._sprung(statement, turns) if statement.name == "SPRINGDAMPER" else self._function(statement, turns)
         angle = 0.0
@@ -221,20 +221,20 @@ class _Reading:
             turns, ground.place, body.place, stiffness, damping, free_length - angle if turns else free_length
         )
 
-    def _sprung(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
-        names = ("KT", "CT", "ANGLE", "TORQUE") if turns else ("K", "C", "LENGTH", "FORCE")
+    def _sprung(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
+        names = ("KT", "CT", "ANGLE", "TORQUE") if is_rotational else ("K", "C", "LENGTH", "FORCE")
         stiffness, damping, free_length, preload = (float(statement.numbers(name, (0.0,))[0]) for name in names)
         if preload:
             raise statement.refuse(f", {names[3]}", preload, "is not supported: give the free length or angle")
         return stiffness, damping, free_length
 
-    def _function(self, statement: Statement, turns: bool) -> tuple[float, float, float]:
+    def _function(self, statement: Statement, is_rotational: bool) -> tuple[float, float, float]:
         """Stiffness, damping and free length (or angle) of a spring force, which must be linear in travel and rate.
         They are found by evaluating its expression."""
         text = statement.text("FUNCTION").lower().replace("\\", " ")
         i, j = (f"0*{statement.whole(end)}" for end in "IJ")
         travel, rate = (rf"az\(\s*{i}\s*,\s*{j}\s*\)", rf"wz\(\s*{i}\s*,\s*{j}\s*,\s*{j}\s*\)")
-        if not turns:
+        if not is_rotational:
             travel, rate = (rf"{name}\(\s*(?:{i}\s*,\s*{j}|{j}\s*,\s*{i})\s*\)" for name in ("dm", "vr"))
         plain = re.sub(rate, "(rate)", re.sub(travel, "(travel)", text))
         force = _evaluated_expression(statement, plain)
@@ -250,7 +250,7 @@ class _Reading:
         return (
             stiffness,
             damping,
-            -free_length if turns else free_length,
+            -free_length if is_rotational else free_length,
         )  # az is the angle of the ground beside the body
 
 
@@ -289,15 +289,15 @@ def _crossed_markers(ground: Marker, body: Marker, ground_first: bool) -> tuple[
     )
 
 
-def _check_assembled(joint: Statement, kind: Kind, ground: Marker, body: Marker) -> None:
+def _check_assembled(joint: Statement, joint_kind: Kind, ground: Marker, body: Marker) -> None:
     """Refuse a joint that the start does not fit."""
     offset, z = body.place - ground.place, ground.axes[:, 2]
-    if kind in ("prismatic", "cylindrical"):
+    if joint_kind in ("prismatic", "cylindrical"):
         offset = offset - z * (z @ offset)
     if np.linalg.norm(offset) > ASSEMBLY_TOLERANCE:
         raise joint.refuse("", offset.round(9).tolist(), "m lie between its markers at the start: it must be assembled")
-    if kind == "universal":
+    if joint_kind == "universal":
         if abs(z @ body.axes[:, 2]) > ASSEMBLY_TOLERANCE:
             raise joint.refuse("", None, "has arms that are not square to each other at the start")
-    elif kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
+    elif joint_kind != "spherical" and not (_are_parallel(z, body.axes[:, 2]) and z @ body.axes[:, 2] > 0.0):
         raise joint.refuse("", None, "has z axes that are not parallel at the start")

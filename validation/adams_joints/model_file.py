@@ -42,9 +42,9 @@ class Statement:
     number: int
     values: dict[str, list[str]]
 
-    def refuse(self, key_text: str, value: object, allowed: str) -> InputError:
+    def refuse(self, key_text: str, wrong_value: object, allowed: str) -> InputError:
         """InputError about a key or value of this statement."""
-        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", value, allowed)
+        return InputError(self.file, f"line {self.line}: {self.name}/{self.number}{key_text}", wrong_value, allowed)
 
     def has(self, key: str) -> bool:
         """Whether the statement has this key or flag."""

@@ -23,7 +23,7 @@ TRUCK, HIGH_TRUCKS = plane_of_truck(PAPER_TRUCK), plane_of_truck(PAPER_TRUCK.mod
 """The paper's truck, and one as high as it is long and twice as high as it is wide."""
 
 
-def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
+def energy_grows(speeds: tuple[float, float, float], brake_torque: float) -> Error:
     """Case: the truck slides on ice with rates of x, y (m/s) and heading (rad/s) under brake torques (N m). Error:
     ratio of the largest gain of kinetic energy over 20 ms to the initial energy."""
 
@@ -31,12 +31,12 @@ def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
         return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
 
     def error(implementation: str, folder: Path) -> float:
-        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, turning=0.0)
+        moved_vehicle = MovedVehicle(implementation, TRUCK, ICE, rim_turning=0.0)
         moved_vehicle.state[1] = speeds
         first, gains = energy(moved_vehicle.state[1]), []
         for _ in range(25):
             energy_before = energy(moved_vehicle.state[1])
-            moved_vehicle.under(np.full((5, 4), level), 5e-3)
+            moved_vehicle.under(np.full((5, 4), brake_torque), 5e-3)
             gains.append(energy(moved_vehicle.state[1]) - energy_before)
         return float(max(*gains, 0.0) / first) if np.isfinite(moved_vehicle.state).all() else np.inf
 
@@ -77,8 +77,8 @@ def turned_over(implementation: str, folder: Path) -> float:
 def jackknifed_train_error(implementation: str, folder: Path) -> float:
     """Case: a train folded by 100 degrees slides on dry road with all wheels locked. Error: ratio of the largest gain
     of energy over 0.4 s to the initial energy."""
-    plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), transfer=False)
-    moved_vehicle = MovedVehicle(implementation, plane, DRY, turning=0.0)
+    plane = plane_of_train(PAPER_TRUCK, CHOSEN_TRAILER.model_copy(update={"fold": np.pi}), with_load_transfer=False)
+    moved_vehicle = MovedVehicle(implementation, plane, DRY, rim_turning=0.0)
     state = moved_vehicle.state
     state[0, 3:] = np.radians(-100.0)
 
@@ -100,9 +100,9 @@ def no_friction_on_one_side(implementation: str, folder: Path) -> float:
     relative difference of the lost speed from mu g t / 2."""
     tyres, plane = (
         (bent_friction((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)),
-        plane_of_truck(PAPER_TRUCK, transfer=False),
+        plane_of_truck(PAPER_TRUCK, with_load_transfer=False),
     )
-    moved_vehicle = MovedVehicle(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved_vehicle = MovedVehicle(implementation, plane, *tyres, rim_turning=0.0, road=road([Stretch(0.0, 0, 1)]))
     moved_vehicle.under(np.full((6, 4), 2e4), 1e-3)
     lost = abs((SPEED - moved_vehicle.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
     return lost if moved_vehicle.state[1, 2] < 0.0 else np.inf

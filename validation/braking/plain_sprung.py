@@ -80,12 +80,14 @@ def wheels_of(vehicle: Sprung) -> int:
     return len(vehicle.handling.vehicle.tyres)
 
 
-def states(size: int, state_count: int = STATE_COUNT, wheels: int = 4) -> tuple[np.ndarray, list[WheelForces]]:
+def states(
+    coordinate_count: int, state_count: int = STATE_COUNT, wheels: int = 4
+) -> tuple[np.ndarray, list[WheelForces]]:
     """Random coordinates and rates (state_count, 2, size) at any heading, and the random quantities held constant at
     their wheels.
     """
     random = np.random.default_rng(SEED)
-    coordinates_and_rates = random.normal(0.0, 1.0, (state_count, 2, size)) * np.array([[0.02], [0.3]])
+    coordinates_and_rates = random.normal(0.0, 1.0, (state_count, 2, coordinate_count)) * np.array([[0.02], [0.3]])
     coordinates_and_rates[:, 0, :2], coordinates_and_rates[:, 0, 2] = (
         random.uniform(-50.0, 50.0, (state_count, 2)),
         random.uniform(-np.pi, np.pi, state_count),

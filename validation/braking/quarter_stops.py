@@ -172,9 +172,9 @@ PAPER_STEP = 5.5e-3
 
 
 @cache
-def friction_table(surface_name: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
+def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[TyreTable, Tables]:
     """Tyre table of a surface, both as an object and in the form for compiled functions."""
-    tyre = table_of_surface(surface_name, scale)
+    tyre = table_of_surface(surface_name, friction_scale)
     return tyre, stacked_tables([tyre])
 
 
@@ -191,7 +191,7 @@ def constant_torque_stop(
     speed: float,
     step: float = PAPER_STEP,
     extra_time: float = 0.0,
-    turning: float | None = None,
+    rim_turning: float | None = None,
 ) -> QuarterStop:
     """A run under a constant torque (N m). It lasts ``extra_time`` (s) longer than a stop would take with the smaller
     of two forces: torque / radius, and locked-wheel friction.
@@ -200,4 +200,4 @@ def constant_torque_stop(
     steps = (
         math.ceil((1.25 * speed * quarter_car.mass / least_force + 0.5 + extra_time) / step) if torque > 0.0 else 1000
     )
-    return braked(quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, turning)
+    return braked(quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, rim_turning)

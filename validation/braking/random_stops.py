@@ -69,19 +69,19 @@ def random_stop(seed: int, scene_number: int) -> dict[str, Any]:
     return table
 
 
-def procedure(generator: Draw, kind: str) -> dict[str, Any]:
+def procedure(generator: Draw, procedure_kind: str) -> dict[str, Any]:
     """A random procedure of the driver, as a table of a scene."""
-    options: dict[str, Any] = {"kind": kind, "speed": generator.within(2.0, 25.0)}
-    if kind == "split":
+    options: dict[str, Any] = {"kind": procedure_kind, "speed": generator.within(2.0, 25.0)}
+    if procedure_kind == "split":
         options["right"] = generator.choice(*SURFACES)
-    if kind == "turn":
+    if procedure_kind == "turn":
         options |= {
             "radius": generator.choice(-1.0, 1.0) * generator.within(60.0, 200.0),
             "speed": generator.within(2.0, 7.0),
         }
-    if kind == "j_turn" and generator.chance(0.5):
+    if procedure_kind == "j_turn" and generator.chance(0.5):
         options["steer"] = generator.within(-0.05, 0.05)
-    elif kind == "j_turn":
+    elif procedure_kind == "j_turn":
         options["steering"] = [[0.0, 0.0], [0.5, generator.within(-0.05, 0.05)], [1.5, generator.within(-0.05, 0.05)]]
     return options
 

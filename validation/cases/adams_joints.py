@@ -298,11 +298,11 @@ def _twin(
     return Observed(_id(family, f"twin.{name}"), SYSTEM, quantity, off, "m, -").at_most(TWINS, why, "native")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """What the files themselves hold."""
     rows = tuple(
         (family, str(file_facts["digits"]), "-" if file_facts["lost"] is None else f"{file_facts['lost']:.1e}")
-        for family, file_facts in data.items()
+        for family, file_facts in case_data.items()
     )
     note = "Where nothing damps, a motion that loses energy carries an integration error of the code that wrote it."
     heads = ("family", "digits of the file", "energy lost by the largest kinetic one")

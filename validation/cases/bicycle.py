@@ -42,28 +42,28 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *measured_rows], {"gaps": {e: g.tolist() for e, g in gaps.items()}, "measured": data}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Eigenvalues on stiffening tyres, and the measured bicycle where its recordings were there."""
-    gaps = data["gaps"][ENGINES[0]]
+    gaps = case_data["gaps"][ENGINES[0]]
     rows_of_tables = [
         Table(
             "Tyres that stiffen tend to ideal rolling",
             f"Largest distance (1/s) of the benchmark's eigenvalues at {SPEED:g} m/s from those of ideal rolling.",
             ("stiffness", *ENGINES, "order"),
             tuple(
-                (f"{s:g}", *(f"{data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
+                (f"{s:g}", *(f"{case_data['gaps'][e][i]:.3e}" for e in ENGINES), "" if i == 0 else _order(gaps, i))
                 for i, s in enumerate(STIFFNESS)
             ),
         )
     ]
-    if data["measured"]:
+    if case_data["measured"]:
         headings = ("speed", "damping", "nothing fitted", "frequency", "nothing fitted", "chosen without this speed")
         rows_of_tables.append(
             Table(
                 "Weave of a measured bicycle",
                 "Damping (1/s) and frequency (rad/s) with the windows' scatter; last, deviations in standard ones.",
                 headings,
-                tuple(map(tuple, data["measured"])),
+                tuple(map(tuple, case_data["measured"])),
             )
         )
     return rows_of_tables

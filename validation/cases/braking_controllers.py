@@ -55,14 +55,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *_stop_rows(stops), *_substep_rows(), *_ensemble_rows()], {"stops": stops}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Stops of the truck."""
-    if "stops" not in data:
+    if "stops" not in case_data:
         return []
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
     rows = [
         (name, *(f"{stop_figures[key]:.{digits}f}" for key, digits in shown))
-        for name, stop_figures in data["stops"].items()
+        for name, stop_figures in case_data["stops"].items()
     ]
     return [
         Table(

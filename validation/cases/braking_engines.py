@@ -213,9 +213,9 @@ def circle(radius: float = 15.0, v: float = 0.5, step: float = 2e-4, duration: f
     return abs(float(np.hypot(*at) / front - 1.0)), abs(float(np.hypot(*behind) / rear - 1.0))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Ends of the turn."""
-    rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in data.items())
+    rows = tuple((name, *(f"{value:.6f}" for value in where)) for name, where in case_data.items())
     return [
         Table(
             "End of the turn",

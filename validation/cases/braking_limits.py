@@ -231,7 +231,7 @@ def _refused_row(name: str, ask_refused: Callable[[], Any]) -> Row:
     )
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Stops that a limit of the vehicle ended."""
-    ends = tuple((str(i), end) for i, end in enumerate(data["ends"]) if end)
+    ends = tuple((str(i), end) for i, end in enumerate(case_data["ends"]) if end)
     return [Table("Random stops that do not come to rest", "", ("number", "how it ended"), ends)] if ends else []

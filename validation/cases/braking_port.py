@@ -209,20 +209,20 @@ def _timed(controller: Controller, first: int) -> float:
     return time.perf_counter() - start
 
 
-def _process(kind: str, folder: Path) -> dict[str, Any]:
-    words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), kind, "{port}"]
-    return _failed(f"second process: {kind}", FAULTS[kind], {"command": words}, folder)
+def _process(misbehaviour: str, folder: Path) -> dict[str, Any]:
+    words = [sys.executable, "-S", str(Path(misbehaving_client.__file__)), misbehaviour, "{port}"]
+    return _failed(f"second process: {misbehaviour}", FAULTS[misbehaviour], {"command": words}, folder)
 
 
-def _class(kind: str, folder: Path) -> dict[str, Any]:
-    name, does = CLASSES[kind]
+def _class(misbehaviour: str, folder: Path) -> dict[str, Any]:
+    name, does = CLASSES[misbehaviour]
     well = f"        if given.number < {misbehaving_client.GOOD_SAMPLES}: return Command(valves=np.ones(4))\n"
     (folder / "fails.py").write_text(
         "import ctypes, os, signal, time\nimport numpy as np\nfrom models.brake.controller import Command\n"
         "class Fails:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
     )
-    return _failed(f"class that {kind}", name, {"callable": "fails.py:Fails"}, folder)
+    return _failed(f"class that {misbehaviour}", name, {"callable": "fails.py:Fails"}, folder)
 
 
 SLAVES = {
@@ -235,10 +235,10 @@ SLAVES = {
 """What an FMU does, and the name under which the run must end."""
 
 
-def _slave(kind: str, folder: Path) -> dict[str, Any]:
+def _slave(misbehaviour: str, folder: Path) -> dict[str, Any]:
     from pythonfmu import FmuBuilder
 
-    name, does = SLAVES[kind]
+    name, does = SLAVES[misbehaviour]
     line = "        wheels = np.array"
     well = (
         f"        if self._number == {misbehaving_client.GOOD_SAMPLES}:\n            import ctypes, os\n   "
@@ -247,14 +247,17 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
     source = (Path(port.__path__[0]) / "example_slave.py").read_text().replace(line, well + line)
     (folder / "fails_slave.py").write_text(source)
     return _failed(
-        f"FMU that {kind}", name, {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name}, folder
+        f"FMU that {misbehaviour}",
+        name,
+        {"fmu": FmuBuilder.build_FMU(folder / "fails_slave.py", dest=folder).name},
+        folder,
     )
 
 
-def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _failed(misbehaviour: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """How a run with a failing controller ends, and the time (s) since its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
-    outcome = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
+    outcome = {"kind": misbehaviour, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
         with watched:
             run(_scene(folder, 1.0, {**table, "timeout": timeout}))
@@ -311,12 +314,14 @@ def _id(name: str) -> str:
     return name.replace(": ", ".").replace(" ", "-")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Costs, and every fault with its message."""
-    costs = tuple((name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in data["costs"].items())
+    costs = tuple(
+        (name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in case_data["costs"].items()
+    )
     faults = tuple(
         (fault_record["kind"], fault_record["message"], f"{fault_record['seconds']:.3f}")
-        for fault_record in data["faults"]
+        for fault_record in case_data["faults"]
     )
     return [
         Table(

@@ -95,7 +95,7 @@ def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> di
         key: [stopping_distance(key, FRONT_WHEEL, tyre, torque, speed, step) for step in steps] for key in SCHEMES
     }
     steadily = constant_torque_stop(
-        FRONT_WHEEL, both, torque, speed, turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
+        FRONT_WHEEL, both, torque, speed, rim_turning=(1.0 - slip) * speed / FRONT_WHEEL.radius
     ).distance
     return {
         "exact": true,
@@ -180,13 +180,15 @@ def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
     return [name for name, wrong in broken.items() if wrong]
 
 
-def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float, ...]) -> Row:
+def _sweep_row(surfaces: tuple[str, ...], friction_levels: np.ndarray, steps: tuple[float, ...]) -> Row:
     wrong, runs = list[str](), 0
     for on, step in product(surfaces, steps):
         tyre = friction_table(on)
         lock = float(tyre[0].mu_x.max()) * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
         speed = 11.11 if step >= 1e-3 else SLOW_SPEED
-        for level in levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else levels[SOME_LEVELS]:
+        for level in (
+            friction_levels if on in FULL_SWEEP_SURFACES or step >= PAPER_STEP else friction_levels[SOME_LEVELS]
+        ):
             faults = faults_of(
                 constant_torque_stop(FRONT_WHEEL, tyre, level * lock, speed, step, WATCHED_SECONDS),
                 FRONT_WHEEL.radius,
@@ -213,7 +215,7 @@ def _locked_row() -> Row:
     for on in NAMED_SURFACES:
         tyre = friction_table(on)
         torque = 2.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius * float(tyre[0].mu_x.max())
-        distance = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, turning=0.0).distance
+        distance = constant_torque_stop(FRONT_WHEEL, tyre, torque, 11.11, rim_turning=0.0).distance
         errors.append(abs(distance * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
     return Observed(
         "braking_stop.locked",
@@ -245,44 +247,44 @@ def _release_row() -> Row:
     ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
 
 
-def _friction_row(levels: int) -> Row:
+def _friction_row(level_count: int) -> Row:
     torque = 3.0 * FRONT_WHEEL.mass * GRAVITY * FRONT_WHEEL.radius
     distances = [
         constant_torque_stop(FRONT_WHEEL, friction_table("ice", float(scale)), torque, 11.11).distance
-        for scale in np.geomspace(0.3, 8.0, levels)
+        for scale in np.geomspace(0.3, 8.0, level_count)
     ]
     return Observed(
         "braking_stop.friction",
         SYSTEM,
-        f"levels of friction, of {levels}, at which a higher level does not shorten the stop, brakes beyond lock",
+        f"levels of friction, of {level_count}, at which a higher level does not shorten the stop, brakes beyond lock",
         sum(b >= a for a, b in pairwise(distances)),
         "",
     ).within(0, 0, "asked for", "none")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Error of the stopping distance by scheme and step."""
     lines = [
         (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in errors))
-        for case, curve in data["curves"].items()
+        for case, curve in case_data["curves"].items()
         for scheme, errors in curve["errors"].items()
     ]
     note = (
         f"In per cent of the exact distance. *: it does not stop in {LONGEST_TIME_RATIO:g} times its time; "
         "the way until then."
     )
-    heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in case_data["steps"]))
     return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 5.8), sharex=True, sharey=True)
-    milliseconds = 1e3 * np.array(data["steps"])
+    milliseconds = 1e3 * np.array(case_data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
-    for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):
+    for ax, (name, curve) in zip(axes.flat, case_data["curves"].items(), strict=True):
         for scheme, style in styles.items():
             errors, left = 100.0 * np.abs(np.transpose(curve["errors"][scheme]))
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme

@@ -114,8 +114,8 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
     ]
 
 
-def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
-    apart = np.abs(turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
+def _mirror_rows(left_turn: Run, mirrored: Run) -> list[Row]:
+    apart = np.abs(left_turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
     return [
         Observed(
             "braking_suspension.mirror",
@@ -254,9 +254,9 @@ def _limit_rows(ends: list[list[float]]) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The limit of a stiff suspension."""
-    rows = tuple((f"{stiffer:g}", f"{apart:.6f}") for stiffer, apart in data["limit"])
+    rows = tuple((f"{stiffer:g}", f"{apart:.6f}") for stiffer, apart in case_data["limit"])
     return [
         Table(
             "Stiff suspension and plane vehicle",

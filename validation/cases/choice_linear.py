@@ -343,9 +343,9 @@ def _summary_of_choice(judged_choice: Judged) -> dict[str, Any]:
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The choices by how they fared."""
-    scenes = data["scenes"]
+    scenes = case_data["scenes"]
     saved = np.array([judged_choice["saving"] for judged_choice in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
     note = (
@@ -355,13 +355,13 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("What choosing effects saves", note, ("percentile", "times fewer calls"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot predicted over confirmed changes, and the saved computing time over the tolerance."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, VERMILION, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     predicted, confirmed_ = (
-        100 * abs(np.array([v for judged_choice in data["scenes"] for v in judged_choice[key]]))
+        100 * abs(np.array([v for judged_choice in case_data["scenes"] for v in judged_choice[key]]))
         for key in PREDICTED_CONFIRMED
     )
     ends = np.array([1e-4, 12.0])
@@ -376,7 +376,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     )
     left.legend(loc="upper left")
     tolerance, saving = (
-        np.array([judged_choice[key] for judged_choice in data["scenes"]]) for key in ("tolerance", "saving")
+        np.array([judged_choice[key] for judged_choice in case_data["scenes"]]) for key in ("tolerance", "saving")
     )
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")

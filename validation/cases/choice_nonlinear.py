@@ -193,11 +193,11 @@ def _summary_of_choice(judged_choice: JudgedByRuns) -> Saved:
     }
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Savings by system, and which effects went how often."""
     rows = []
-    for system in data["systems"]:
-        of_system = [judged_choice for judged_choice in data["scenes"] if judged_choice["system"] == system]
+    for system in case_data["systems"]:
+        of_system = [judged_choice for judged_choice in case_data["scenes"] if judged_choice["system"] == system]
         saved = [judged_choice["calls"][0] / judged_choice["calls"][2] for judged_choice in of_system]
         alone = [judged_choice["calls"][0] / judged_choice["calls"][1] for judged_choice in of_system]
         faster = [judged_choice["seconds"][0] / judged_choice["seconds"][2] for judged_choice in of_system]
@@ -221,15 +221,15 @@ def tables(data: Saved) -> list[Table]:
     return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot predicted over confirmed changes, and savings over the tolerance."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
-    for i, system in enumerate(data["systems"]):
-        of_system = [judged_choice for judged_choice in data["scenes"] if judged_choice["system"] == system]
+    for i, system in enumerate(case_data["systems"]):
+        of_system = [judged_choice for judged_choice in case_data["scenes"] if judged_choice["system"] == system]
         predicted, confirmed = (
             100 * np.array([value for judged_choice in of_system for value in judged_choice[key]])
             for key in ("predicted", "confirmed")

@@ -198,11 +198,11 @@ def _mirrored_profiles() -> list[Row]:
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot both conicities of the standard's profiles with the standard's limits."""
     from models.drawing.figures import BLUE, VERMILION, add_heading, legend_below, panels
 
-    standard = data["standard"]
+    standard = case_data["standard"]
     if not standard:
         return []
     figure, axes = panels(len(standard), 2, 2.6)

@@ -290,10 +290,10 @@ def _agreement_row() -> Row:
     ).at_most(1e-10, "the same kernel and method; what differs is rounding", "shared kernel")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every cost per step, and runs at low speed."""
-    slow = slow_wheels.table(data["slow"])
-    if "points" not in data:
+    slow = slow_wheels.table(case_data["slow"])
+    if "points" not in case_data:
         return [slow]
     note = (
         "Microseconds per step, median of interleaved rounds, that of the step with its 95 % interval; "
@@ -314,15 +314,15 @@ def tables(data: dict[str, Any]) -> list[Table]:
             *(f"{1e6 * p[part_name]:.2f}" for part_name in ("own", "kernel", "over")),
             "{:.0f} ({:.0f} to {:.0f})".format(*(100.0 * share for share in p["share"])),
         )
-        for p in data["points"]
+        for p in case_data["points"]
     )
     return [Table("Cost per step of a contact kernel inside an engine", note, heads, rows), slow]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot cost per step for each law, and shares of engine, kernel and bridge."""
-    if "points" not in data:
+    if "points" not in case_data:
         return []
     from validation.contact.contact_bridges_figure import figure
 
-    return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(data["points"]))]
+    return [("Contact kernels inside the engines: cost per step by law, and its shares", figure(case_data["points"]))]

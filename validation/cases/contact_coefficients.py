@@ -202,9 +202,9 @@ def _span(rows: Array) -> str:
     return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(rows[:, 0]))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Deviation of the table from the exact theory, node by node at nu = 1/4."""
-    nodes = np.array(data["nodes"])
+    nodes = np.array(case_data["nodes"])
     some = nodes[nodes[:, 1] == 0.25]
     rows = tuple(
         (
@@ -220,14 +220,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Kalker's coefficients by the exact theory", note, ("a/b", *NAMES), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot coefficients over the axis ratio, and the library's deviation from the exact theory."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
-    solved = np.array([row for part_name in data.values() for row in part_name])
+    solved = np.array([row for part_name in case_data.values() for row in part_name])
     quarter = solved[np.abs(solved[:, 1] - 0.25) < 0.04]
     for i, (name, curve) in enumerate(zip(NAMES, (c.c11, c.c22, c.c23, c.c33), strict=True)):
         left.loglog(ratio, curve, color=f"C{i}", label=name)

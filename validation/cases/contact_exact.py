@@ -61,9 +61,17 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _row(
-    name: str, words: str, value: float, bound: float, tolerance_reason: str, unit: str = "", side: Any = "closed form"
+    name: str,
+    quantity: str,
+    largest_error: float,
+    bound: float,
+    tolerance_reason: str,
+    unit: str = "",
+    independence: Any = "closed form",
 ) -> Row:
-    return Observed(f"contact_exact.{name}", SYSTEM, words, value, unit).at_most(bound, tolerance_reason, side)
+    return Observed(f"contact_exact.{name}", SYSTEM, quantity, largest_error, unit).at_most(
+        bound, tolerance_reason, independence
+    )
 
 
 def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
@@ -236,7 +244,7 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
                 float(left[-1]),
                 bound,
                 "as its documentation states",
-                side="none",
+                independence="none",
             )
         )
     total = np.array([np.diff(np.array(v)[:, 1:3], axis=0) for v in refined.values()])
@@ -254,16 +262,18 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     ]
 
 
-def drawn_case(rng: np.random.Generator) -> tuple[ContactCase, int]:
+def drawn_case(generator: np.random.Generator) -> tuple[ContactCase, int]:
     """A random contact with spin, a/b from 0.2 to 5 and Poisson's ratio from 0 to 0.5, with no forces computed; and 60
     to 120 cells."""
-    ratio, level = (float(np.exp(rng.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0)))
-    body = Material(E=2.1e11, nu=float(rng.uniform(0.0, 0.5)))
-    x, y, spin = (float(component) for component in rng.normal(size=3))
+    ratio, level = (
+        float(np.exp(generator.uniform(np.log(low), np.log(high)))) for low, high in ((0.2, 5.0), (0.1, 10.0))
+    )
+    body = Material(E=2.1e11, nu=float(generator.uniform(0.0, 0.5)))
+    x, y, spin = (float(component) for component in generator.normal(size=3))
     case = ContactCase(
         SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, MU, MaterialPair(body, body), "drawn", (x, y, spin), level
     )
-    return case, int(rng.integers(60, 121))
+    return case, int(generator.integers(60, 121))
 
 
 def _converged_row() -> Row:
@@ -280,7 +290,7 @@ def _converged_row() -> Row:
         float(failed),
         0.0,
         "none is asked for",
-        side="none",
+        independence="none",
     )
 
 
@@ -296,14 +306,14 @@ def _rows_of_contact_sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     solved = [_differences_from_file(row, 20 if quick else 40) for row in table]
     force, moment = (max(solved_row[i] for solved_row in solved) for i in (2, 3))
     return solved, [
-        _row("sample", words, force, 0.01, "its own error and ours", side="native"),
+        _row("sample", words, force, 0.01, "its own error and ours", independence="native"),
         _row(
             "sample.moment",
             words.replace("forces", "moments").replace("mu N", "mu N sqrt(ab)"),
             moment,
             0.01,
             "its own error and ours",
-            side="native",
+            independence="native",
         ),
     ]
 
@@ -328,12 +338,12 @@ def _differences_from_file(row: dict[str, str], cells: int) -> list[Any]:
     return [row["kind"], value["a_over_b"], float(force), moment]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Forces over grids, and the sample."""
-    grids = [f"{int(row[0])} cells" for row in next(iter(data["refined"].values()))]
+    grids = [f"{int(row[0])} cells" for row in next(iter(case_data["refined"].values()))]
     rows = tuple(
         (name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
-        for name, values in data["refined"].items()
+        for name, values in case_data["refined"].items()
     )
     solved = [
         Table(
@@ -343,10 +353,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
             rows,
         )
     ]
-    if data["sample"]:
+    if case_data["sample"]:
         rows = tuple(
             (f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
-            for kind, ratio, force, moment in data["sample"]
+            for kind, ratio, force, moment in case_data["sample"]
         )
         solved.append(
             Table(
@@ -359,12 +369,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return solved
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
-    x, traction = data["strip"]
+    x, traction = case_data["strip"]
     fine = np.linspace(-1, 1, 801)
     left.plot(fine, carter(fine, 1.0, 0.5), color="0.4", label="Carter")
     left.plot(x, traction, ".", label="40 cells, middle of a/b = 1/50")
@@ -372,7 +382,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     left.set_title("Cylinder at half the creepage of sliding")
     left.set_xticks([-1, -0.5, 0, 0.5, 1])
     left.legend()
-    for name, values in data["refined"].items():
+    for name, values in case_data["refined"].items():
         numbers = np.array(values)
         left_over = np.linalg.norm(np.diff(numbers[:, 1:3], axis=0), axis=1)
         right.loglog(numbers[1:, 0], 100 * left_over, "o-", label=name)

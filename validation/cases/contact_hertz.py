@@ -203,14 +203,17 @@ def _outcome(ask_refused: Callable[[], object]) -> str:
     return "accepted"
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Worst errors by range of the ratio of axes."""
-    ratio = np.array(data["ratio"])
+    ratio = np.array(case_data["ratio"])
     ranges = {"1e-6 to 1e-4": (0.0, 1e-4), "1e-4 to 0.1": (1e-4, 0.1), "0.1 to 0.9": (0.1, 0.9), "0.9 to 1": (0.9, 1.0)}
     rows = tuple(
         (
             title,
-            *(f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}" for errors in data["errors"].values()),
+            *(
+                f"{np.array(errors)[(ratio > low) & (ratio <= high)].max():.1e}"
+                for errors in case_data["errors"].values()
+            ),
         )
         for title, (low, high) in ranges.items()
     )
@@ -218,10 +221,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
         f"Worst relative error against {DIGITS} digits, driven by load and by approach, the long axis along x and "
         "along y."
     )
-    return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *data["errors"]), rows)]
+    return [Table("Hertz: relative error by the ratio of axes", note, ("axes", *case_data["errors"]), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot semi-axes over the ratio of curvatures, and errors over the axis ratio."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -232,8 +235,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")
     left.legend()
-    ratio = np.array(data["ratio"])
-    for name, errors in data["errors"].items():
+    ratio = np.array(case_data["ratio"])
+    for name, errors in case_data["errors"].items():
         right.loglog(ratio[: len(RANGE)], np.maximum(errors[: len(RANGE)], 1e-17), ".", markersize=4, label=name)
     right.axhline(BOUND, color="black", linestyle=":", label="allowed")
     right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))

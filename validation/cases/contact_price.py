@@ -238,11 +238,11 @@ def _table_row(folder: Path) -> Row:
     )
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The paper's comparison."""
-    return [table(data["programs"])] if data else []
+    return [table(case_data["programs"])] if case_data else []
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """No figure, since the cost of accuracy in contact is drawn with the other problems of ``price``."""
     return []

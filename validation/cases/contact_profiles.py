@@ -212,7 +212,7 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every shift: places, loads, pressures."""
     heads = (
         "shift [mm]",
@@ -229,7 +229,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
         f"{BENCHMARK}; {LOAD / 1e3:g} kN on the right wheel, vertical. A row for every place closer than 0.2 mm; y on "
         "the rail from its highest point, on the wheel from the taping line; pressures of the theory of 1983."
     )
-    return [Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in data.items()]
+    return [
+        Table(f"Places of contact, {name}", note, heads, tuple(_table_rows(cases))) for name, cases in case_data.items()
+    ]
 
 
 def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
@@ -250,12 +252,12 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot position and load of the contact points over the lateral shift."""
     from models.drawing.figures import add_heading, subplots
 
     figure, axis = subplots(figsize=(7.0, 3.6))
-    for name, cases in data.items():
+    for name, cases in case_data.items():
         points = [
             (case["shift"], contact_point["rail"], contact_point["load"])
             for case in cases

@@ -106,22 +106,22 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
     return abs(at_high - at_low)
 
 
-def _against_exact(shape: Shape) -> dict[str, Any]:
+def _against_exact(contact_shape: Shape) -> dict[str, Any]:
     """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
     forces are in % of mu N."""
     contacts = {
-        name: press(shape.distance, PAIR, load=shape.load, options=fitting_options)
+        name: press(contact_shape.distance, PAIR, load=contact_shape.load, options=fitting_options)
         for name, fitting_options in WAYS.items()
     }
-    normal = exact_normal(shape, EXACT_CELLS, shape.box or _box_around(contacts["elliptic"]))
-    motions = creepages(normal.area, shape.load)
+    normal = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or _box_around(contacts["elliptic"]))
+    motions = creepages(normal.area, contact_shape.load)
     exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
     figures = {"approach": normal.approach, "area": normal.area, "peak": float(normal.pressure.max())}
     errors_by_fitting = {}
     for name, contact in contacts.items():
         forces = [
-            float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * shape.load))
+            float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * contact_shape.load))
             for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
@@ -129,11 +129,12 @@ def _against_exact(shape: Shape) -> dict[str, Any]:
     return {"exact": figures, "ways": errors_by_fitting, "rolling": len(solved), "asked": len(exact)}
 
 
-def _approach_of(shape: Shape) -> dict[str, float]:
+def _approach_of(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
-    exact = exact_normal(shape, EXACT_CELLS, shape.box or (0.0, 0.0, 0.0, 0.0)).approach
+    exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(shape.distance, PAIR, load=shape.load, options=fitting_options).approach / exact - 1.0
+        name: press(contact_shape.distance, PAIR, load=contact_shape.load, options=fitting_options).approach / exact
+        - 1.0
         for name, fitting_options in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
     }
 
@@ -212,9 +213,9 @@ def _jump_row(jump: float) -> Row:
     )
 
 
-def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
+def _shape_rows(errors_by_shape: dict[str, dict[str, Any]]) -> list[Row]:
     rows = []
-    for name, case in shapes.items():
+    for name, case in errors_by_shape.items():
         row_name = "contact_simplified." + "_".join(re.findall(r"\w+", name))
         best = case["ways"]["elliptic"]
         rows.append(
@@ -282,16 +283,16 @@ def _ratio(seconds_by_program: dict[str, list[float]], first: str, other_program
     return float(np.median(seconds_by_program[first]) / np.median(seconds_by_program[other_program]))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Hertz's ellipses; and in the full run every shape and way, and the size of the net."""
     signed = "{:+.2f}".format
     hertz = tuple(
         (ratio, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak", "paper")))
-        for ratio, case in data["hertz"].items()
+        for ratio, case in case_data["hertz"].items()
     )
     heads: tuple[str, ...] = ("B/A", "approach [%]", "area [%]", "peak pressure [%]", "approach, paper [%]")
     tables = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
-    if "shapes" not in data:
+    if "shapes" not in case_data:
         return tables
     rows = tuple(
         (
@@ -301,7 +302,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{errors['force']:.1f}",
             f"{errors['force_max']:.1f}",
         )
-        for name, case in data["shapes"].items()
+        for name, case in case_data["shapes"].items()
         for fitting_options, errors in case["ways"].items()
     )
     note = (
@@ -313,18 +314,18 @@ def tables(data: dict[str, Any]) -> list[Table]:
     heads = ("shape", "way", "approach [%]", "area [%]", "peak [%]", "force, mean [% mu N]", "force, max [% mu N]")
     nets = tuple(
         (net, *(signed(100.0 * case[key]) for key in ("approach", "area", "peak")))
-        for net, case in data["nets"].items()
+        for net, case in case_data["nets"].items()
     )
     together = tuple(
         (name, *("" if np.isnan(value) else signed(100.0 * value) for value in case.values()))
-        for name, case in data["grown"].items()
+        for name, case in case_data["grown"].items()
     )
     return [
         *tables,
-        Table("Theory of 1983 against the exact contact", note + " " + _errors_text(data["shapes"]), heads, rows),
+        Table("Theory of 1983 against the exact contact", note + " " + _errors_text(case_data["shapes"]), heads, rows),
         Table(
             "Size of the crude net",
-            "Errors on an ellipse with B/A = 5. " + _net_errors_text(data["nets"]),
+            "Errors on an ellipse with B/A = 5. " + _net_errors_text(case_data["nets"]),
             ("net", *heads[2:5]),
             nets,
         ),
@@ -339,14 +340,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def _errors_text(shapes: dict[str, dict[str, Any]]) -> str:
+def _errors_text(errors_by_shape: dict[str, dict[str, Any]]) -> str:
     """Sentence on the errors of the ways of fitting: means over all shapes."""
 
     def mean(variant: str, key: str) -> str:
         scale = 1.0 if key == "force" else 100.0
-        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in shapes.values()]):.1f} %"
+        return f"{scale * np.nanmean([abs(case['ways'][variant][key]) for case in errors_by_shape.values()]):.1f} %"
 
-    apart = shapes["two patches"]["ways"]
+    apart = errors_by_shape["two patches"]["ways"]
     return (
         f"Mean errors over all shapes: Hertz's profile of the pressure instead of the paper's makes "
         f"{mean('elliptic', 'area')} of {mean('paper', 'area')} in the area, {mean('elliptic', 'force')} of "
@@ -371,13 +372,13 @@ def _net_errors_text(nets: dict[str, dict[str, float]]) -> str:
     )
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the errors of the two pressure profiles for each shape."""
-    if "shapes" not in data:
+    if "shapes" not in case_data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
-    shapes = data["shapes"]
+    shapes = case_data["shapes"]
     figure, axes = subplots(1, 4, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
     shape_positions = np.arange(len(shapes))
     for axis, (key, label) in zip(

@@ -176,7 +176,7 @@ def _row(combination: Saved) -> Row:
     )
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
@@ -190,7 +190,7 @@ def tables(data: Saved) -> list[Table]:
             str(combination["members"]),
             f"{combination['median'] / combination['predicted']:.3f}",
         )
-        for combination in data["combinations"]
+        for combination in case_data["combinations"]
     )
     heads = (
         "road",
@@ -209,16 +209,18 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot measured over predicted drift-off times."""
     from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, add_heading, subplots
 
     figure, axis = subplots(figsize=(5.2, 4.2))
-    ends = [combination["predicted"] for combination in data["combinations"]]
+    ends = [combination["predicted"] for combination in case_data["combinations"]]
     line = np.array([0.9 * min(ends), 1.1 * max(ends)])
     axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color=DARK, linewidth=0, label="within 10 %")
     for source, colour in (("noise", BLUE), ("interpolation", VERMILION), ("model", GREEN)):
-        of_source = [combination for combination in data["combinations"] if combination["source"].startswith(source)]
+        of_source = [
+            combination for combination in case_data["combinations"] if combination["source"].startswith(source)
+        ]
         if of_source:
             predicted, middle, quartiles = (
                 np.array([combination[k] for combination in of_source]) for k in ("predicted", "median", "quartiles")

@@ -107,11 +107,13 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     return drifted
 
 
-def _drift(assembly: Assembly, engine: str, method: str, value: float, true_run: Result) -> dict[str, float]:
+def _drift(
+    assembly: Assembly, engine: str, method: str, step_or_tolerance: float, true_run: Result
+) -> dict[str, float]:
     """Drift-off time (s) of a run (its duration if it does not drift off), and its pitch error (rad) at the end."""
-    settings = Settings(method, value, DURATION)
+    settings = Settings(method, step_or_tolerance, DURATION)
     if method in ADAPTIVE:
-        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
+        settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, step_or_tolerance)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true_run.times, true_run["pitch"]))
     time = GrowthCurve(run.times, error).passing_time()
@@ -265,7 +267,7 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
     return rows
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
         (
@@ -276,7 +278,7 @@ def tables(data: Saved) -> list[Table]:
             _drift_off_text(solver_record),
             f"{solver_record['error']:.2e}",
         )
-        for solver_record in data["solvers"]
+        for solver_record in case_data["solvers"]
     )
     note = (
         f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
@@ -284,11 +286,11 @@ def tables(data: Saved) -> list[Table]:
     )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
     tables = [Table("Drift-off by solver and interpolation", note, heads, rows)]
-    if data["smoothing"]:
+    if case_data["smoothing"]:
         shown = {"growth": ".3f", "law": ".3f", "spread": ".4f", "damage f3z": ".3f", "damage f3x": ".3f"}
         lines = tuple(
             (solver_record["name"], *(f"{solver_record[name]:{form}}" for name, form in shown.items()))
-            for solver_record in data["smoothing"]
+            for solver_record in case_data["smoothing"]
         )
         columns = (
             "treatment",

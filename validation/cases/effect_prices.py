@@ -287,7 +287,7 @@ def _job(bare: Scene, engine: str) -> Any:
     return lambda: output_channels(assembly, built.run(), built)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """The price list of effects."""
     note = (
         "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
@@ -298,7 +298,7 @@ def tables(data: Saved) -> list[Table]:
         "costs nothing."
     )
     headings = ("effect", "engine", "adds", "without it, us per step", "adds, us per step", "factor")
-    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
+    return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in case_data["price"]))]
 
 
 def _line(saved_entry: Saved) -> tuple[str, ...]:

@@ -206,11 +206,11 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     return rows, table
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Error by step on the study road, where it was driven."""
-    if not data["table"]:
+    if not case_data["table"]:
         return []
-    rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
+    rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in case_data["table"])
     title = "Enforced moment on the study road, perturbed model, after the first 20 ms"
     note = (
         "Rms of the error / rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness of 40 Hz "
@@ -219,12 +219,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table(title, note, ("engine", "integrator", "step [ms]", "relative error"), rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot how the multiplier rings after an abrupt start."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 3.2))
-    paths = data["ringing"]
+    paths = case_data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)
         axis.plot(1e3 * np.array(paths["time"]), path, style, label=name, color=f"C{i // 2}", linewidth=width)

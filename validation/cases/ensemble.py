@@ -346,9 +346,9 @@ def _data(
     }
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
-    if not data:
+    if not case_data:
         return []
     paths = (
         f"{LARGE_ENSEMBLE_PATHS:,} paths of {LARGE_ENSEMBLE_SECONDS:g} s, noise {DEVIATION:g} N at 1 kHz "
@@ -356,11 +356,11 @@ def tables(data: Saved) -> list[Table]:
     )
     spreads = tuple(
         (f"{when:g}", f"{pitch:.4e} +- {e:.0e}", f"{heave:.4e} +- {o:.0e}")
-        for when, pitch, e, heave, o in data["spreads"]
+        for when, pitch, e, heave, o in case_data["spreads"]
     )
     times = tuple(
         (f"{100 * level:g} %", f"{value:.2f}", f"{low:.2f} to {high:.2f}")
-        for level, value, low, high in data["quantiles"]
+        for level, value, low, high in case_data["quantiles"]
     )
     prices = tuple(
         (
@@ -368,7 +368,7 @@ def tables(data: Saved) -> list[Table]:
             f"{1e9 * price:,.0f}",
             f"{price * LARGE_ENSEMBLE_PATHS * LARGE_ENSEMBLE_SECONDS / STEP / 60:,.1f}",
         )
-        for method_name, price in data["prices"].items()
+        for method_name, price in case_data["prices"].items()
     )
     return [
         Table(
@@ -393,17 +393,17 @@ def tables(data: Saved) -> list[Table]:
     ]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Fan of the pitch error and histogram of the drift-off times."""
-    if not data:
+    if not case_data:
         return []
     from models.drawing.drift import draw_fan
     from models.drawing.figures import BLUE, COLUMN_WIDTH, add_heading, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6), width_ratios=(3, 2))
-    draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
+    draw_fan(fan, np.array(case_data["times"]), np.array(case_data["fan"]))
     fan.legend(loc="lower right")
-    histogram.stairs(data["counts"], data["edges"], fill=True, color=BLUE, alpha=0.6)
+    histogram.stairs(case_data["counts"], case_data["edges"], fill=True, color=BLUE, alpha=0.6)
     histogram.set_title("Drift-offs: paths per half second [-]")
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")

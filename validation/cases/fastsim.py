@@ -75,11 +75,11 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + answers + timed, data
 
 
-def creepages(kind_names: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
+def creepages(kind_names: tuple[str, ...], creepage_levels: tuple[float, ...]) -> Contacts:
     """Contacts, as columns, for every axis ratio, kind and level of creepage. Creepages have the unit mu N / (G c^2 C),
     where C is C11, C22 or C23 c."""
     ratio, kind, level = (
-        grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kind_names)), levels, indexing="ij")
+        grid.ravel() for grid in np.meshgrid(RATIOS, np.arange(len(kind_names)), creepage_levels, indexing="ij")
     )
     creepage_parts = np.array([KINDS[name] for name in kind_names])[kind] * level[:, None]
     known, unit = coefficients(ratio, PAIR.nu), FRICTION * LOAD / (PAIR.G * MEAN_AXIS**2)
@@ -315,11 +315,11 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
     ], table
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Errors by cells, and in full those of the model and the price."""
     rows = tuple(
         (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
-        for name, values in data["cells"].items()
+        for name, values in case_data["cells"].items()
     )
     answers = [
         Table(
@@ -330,35 +330,35 @@ def tables(data: dict[str, Any]) -> list[Table]:
             rows,
         )
     ]
-    if "model" in data:
+    if "model" in case_data:
         answers.append(
             Table(
                 "FASTSIM: error of the model",
                 "Converged, against the exact theory: force in % of mu N, "
                 "moment in % of mu N and the longer semi-axis.",
                 ("bound", "flexibilities", "mean", "largest", "moment, mean", "moment, largest"),
-                tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:])) for row in data["model"]),
+                tuple((*row[:2], *(f"{100 * v:.2f}" for v in row[2:])) for row in case_data["model"]),
             )
         )
-    if "speed" in data:
+    if "speed" in case_data:
         answers.append(
             Table(
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
                 "machine, its lower bound: median of rounds with its 95 % interval.",
                 ("what", "time", "time / bound"),
-                tuple(tuple(row) for row in data["speed"]),
+                tuple(tuple(row) for row in case_data["speed"]),
             )
         )
     return answers
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot the largest error over the number of cells."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axis = subplots(figsize=(COLUMN_WIDTH, 4.4))
-    for i, (name, values) in enumerate(data["cells"].items()):
+    for i, (name, values) in enumerate(case_data["cells"].items()):
         axis.loglog(
             CELLS,
             [100 * most for _, most in values],

@@ -105,10 +105,10 @@ def _samples(assembly: Assembly) -> Sampled:
     return assembly.input
 
 
-def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> ErrorPath:
-    """Error path over a section of a run that starts at sample ``first`` in the state ``start`` (8,)."""
+def _path(assembly: Assembly, start_state: np.ndarray, first: int, samples: int) -> ErrorPath:
+    """Error path over a section of a run that starts at sample ``first`` in the state ``start_state`` (8,)."""
     forces = replace(_samples(assembly), values=_samples(assembly).values[first : first + samples + 1])
-    return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
+    return ErrorPath(replace(assembly, initial=start_state, input=forces), forces, 1, samples)
 
 
 def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Saved:
@@ -139,9 +139,9 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str =
     }
 
 
-def _spread_rows(spread: Saved) -> list[Row]:
+def _spread_rows(spread_record: Saved) -> list[Row]:
     """Rows: spread of the pitch by noise at every second, compared with its closed laws."""
-    seen = "pitch" if "pitch" in spread else "covariance"
+    seen = "pitch" if "pitch" in spread_record else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
@@ -152,19 +152,25 @@ def _spread_rows(spread: Saved) -> list[Row]:
             spread_then / expected,
             "",
         ).within(1.0, 0.05, why, "closed form")
-        for t, spread_then, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
+        for t, spread_then, expected in zip(
+            spread_record["time"], spread_record[seen], spread_record["law, run"], strict=True
+        )
     ]
-    miss = spread[seen][-1] / spread["t^1.5"][-1]
+    miss = spread_record[seen][-1] / spread_record["t^1.5"][-1]
     rows.append(
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"ratio of the pitch's standard deviation at {spread['time'][-1]} s to t^1.5, the law without growth",
+            f"ratio of the pitch's standard deviation at {spread_record['time'][-1]} s to t^1.5, the law without "
+            "growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
-    heave = np.array(spread["heave" if "heave" in spread else "heave covariance"]) / spread["heave law"]
+    heave = (
+        np.array(spread_record["heave" if "heave" in spread_record else "heave covariance"])
+        / spread_record["heave law"]
+    )
     rows.append(
         Observed(
             "growth.spread.heave",
@@ -174,7 +180,7 @@ def _spread_rows(spread: Saved) -> list[Row]:
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
-    alone = np.array(spread["covariance"]) / spread["law, forces"]
+    alone = np.array(spread_record["covariance"]) / spread_record["law, forces"]
     return [
         *rows,
         Observed(
@@ -315,9 +321,9 @@ def _linear_row(folder: Path) -> Row:
     return Observed("growth.linear", SYSTEM, what, off, "rad").at_most(0.05, why, "none")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Spread over time, and growth rates by road."""
-    spread = data["spread"]
+    spread = case_data["spread"]
     known = ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
     names = [name for name in known if name in spread]
     rows = tuple((str(t), *(f"{spread[name][i]:.4g}" for name in names)) for i, t in enumerate(spread["time"]))
@@ -327,7 +333,7 @@ def tables(data: Saved) -> list[Table]:
     )
     heads = ("time [s]", *(f"{name} [{'m' if 'heave' in name else 'rad'}]" for name in names))
     keys = ("run", "forces", "measured", "scatter", "body", "swing", "swing law")
-    rates = tuple((name, *(f"{road[key]:.4f}" for key in keys)) for name, road in data["roads"].items())
+    rates = tuple((name, *(f"{road[key]:.4f}" for key in keys)) for name, road in case_data["roads"].items())
     columns = (
         "road or vehicle",
         "law, run [1/s]",
@@ -342,11 +348,11 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
     from models.drawing.figures import add_heading, subplots
 
-    spread = data["spread"]
+    spread = case_data["spread"]
     figure, axis = subplots(figsize=(7.0, 3.6))
     marks = {
         "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),

@@ -254,12 +254,12 @@ def _reduced_row(engine: str) -> Row:
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """How the runs at unstable and stable steps end, with the check and past it."""
     words = ("right", "refused", "raised", "SILENT")
     rows = tuple(
         (engine, how, *(str(counts[word]) for word in words))
-        for engine, both in data["unstable"].items()
+        for engine, both in case_data["unstable"].items()
         for how, counts in both.items()
     )
     note = (

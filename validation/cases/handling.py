@@ -359,6 +359,6 @@ def _repeat_tyres(repeats: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _repeat_forces(contacts, slides, strips, cells, middle_cells, forces, repeats):
+def _repeat_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces, repeats):
     for _ in range(repeats):
-        tyre_forces(contacts, slides, strips, cells, middle_cells, forces)
+        tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, forces)

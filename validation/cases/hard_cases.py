@@ -80,15 +80,15 @@ def _row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
     return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """The catalogue, counts by family, and the one table of hard cases."""
-    return [_catalogue(data), _counts_by_family(data), _table_of_cases(data["cases"])]
+    return [_catalogue(case_data), _counts_by_family(case_data), _table_of_cases(case_data["cases"])]
 
 
-def _catalogue(data: Saved) -> Table:
+def _catalogue(case_data: Saved) -> Table:
     """Table of the catalogue's failure classes with the cases that belong to each."""
-    words = {name: ["in full"] for _, name in data["known"]}
-    words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
+    words = {name: ["in full"] for _, name in case_data["known"]}
+    words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in case_data["cases"]}
     rows = tuple(
         (str(number), what, "; ".join(f"{name} ({', '.join(words.get(name, ['missing']))})" for name in names))
         for number, (what, names) in COVERED_CLASSES.items()
@@ -103,12 +103,12 @@ def _catalogue(data: Saved) -> Table:
     )
 
 
-def _counts_by_family(data: Saved) -> Table:
+def _counts_by_family(case_data: Saved) -> Table:
     """Table with the number of cases, of cases that were run, and of their outcomes, for every family and for all."""
-    known = Counter(family for family, _ in data["known"])
-    groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
-    groups["all"] = data["cases"]
-    known["all"] = len(data["known"])
+    known = Counter(family for family, _ in case_data["known"])
+    groups = {name: [entry for entry in case_data["cases"] if entry["family"] == name] for name in known}
+    groups["all"] = case_data["cases"]
+    known["all"] = len(case_data["known"])
     ended = {
         name: Counter(o["word"] for entry in in_group for o in entry["outcomes"].values())
         for name, in_group in groups.items()

@@ -145,11 +145,11 @@ def _found_row(index: int, name: str, stiffness: float, predicted_stiffness: flo
     )
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the least stiffness that holds in each setting."""
     rows = tuple(
-        (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{data['law']:.1f}")
-        for name, stiffness in data["found"]
+        (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{case_data['law']:.1f}")
+        for name, stiffness in case_data["found"]
     )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
     note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD_PITCH} rad."

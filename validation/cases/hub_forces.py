@@ -358,10 +358,10 @@ def _faults(scene: HubScene) -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Damage of every section force, run by run."""
     shown = []
-    for frame, of_runs in data.items():
+    for frame, of_runs in case_data.items():
         runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}
         elements = next(iter(runs.values()))
         rows = tuple((element, *(f"{damages[element]:.3g}" for damages in runs.values())) for element in elements)

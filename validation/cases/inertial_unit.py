@@ -89,10 +89,10 @@ def _attitude_from_exact_rates() -> list[Row]:
 
 
 def _closed_form_row(
-    id: str, quantity: str, value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
+    id: str, quantity: str, error_value: float, unit: str, tolerance_reason: str, bound: float = 1e-12
 ) -> Row:
     """Row for an error relative to a closed form."""
-    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(
+    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, error_value, unit).at_most(
         bound, tolerance_reason, "closed form"
     )
 

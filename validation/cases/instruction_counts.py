@@ -119,9 +119,9 @@ def _total(dump: Path) -> int:
     return int(matched[1])
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Instructions per step, where they were counted."""
-    rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in data["instructions"].items())
+    rows = tuple((curve_name(curve), f"{count / 1e3:,.1f}") for curve, count in case_data["instructions"].items())
     note = (
         f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
         "function, which they include: the engine, the way into Python and a law there. The start of a run is "

@@ -119,14 +119,14 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     return rows
 
 
-def _outside_row(name: str, words: str, noise: str, values: np.ndarray, freedom: int) -> Row:
+def _outside_row(name: str, quantity: str, noise: str, values: np.ndarray, freedom: int) -> Row:
     """Row: a filter that assumes a wrong variance must fall outside the band."""
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     return behaviour_row(
         f"kalman.{name}",
         SYSTEM,
-        f"{words} of a filter that assumes 4 times the variance of the {noise}",
+        f"{quantity} of a filter that assumes 4 times the variance of the {noise}",
         "inside" if low <= mean <= high else "outside",
         "outside",
         f"mean per degree of freedom {mean:.3f}, band {low:.3f} to {high:.3f}",
@@ -140,16 +140,16 @@ def _band(freedom: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _band_row(name: str, words: str, values: np.ndarray, freedom: int, sample: str) -> Row:
+def _band_row(name: str, quantity: str, values: np.ndarray, freedom: int, sample: str) -> Row:
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     why = (
         f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
         f"freedom: {sample}"
     )
-    return Observed(f"kalman.{name}", SYSTEM, f"{words}, mean per degree of freedom, no model error", mean, "").within(
-        (low + high) / 2, (high - low) / 2, why, "closed form"
-    )
+    return Observed(
+        f"kalman.{name}", SYSTEM, f"{quantity}, mean per degree of freedom, no model error", mean, ""
+    ).within((low + high) / 2, (high - low) / 2, why, "closed form")
 
 
 def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None, sensors: tuple[str, ...]) -> list[Row]:
@@ -295,24 +295,24 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right_model: list[di
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Damage and moments per implementation, and the deviations of the linear closed loop."""
-    if not data["damage"]:
+    if not case_data["damage"]:
         return []
     keys = (*SECTION_FORCE_CHANNELS, "pull", "all, band", "pitch")
     rows = tuple(
         (
             engine,
             *(
-                f"{np.mean([run_damage[engine][key] for run_damage in data['damage']]):.4f} +- "
-                f"{np.std([run_damage[engine][key] for run_damage in data['damage']], ddof=1):.4f}"
+                f"{np.mean([run_damage[engine][key] for run_damage in case_data['damage']]):.4f} +- "
+                f"{np.std([run_damage[engine][key] for run_damage in case_data['damage']], ddof=1):.4f}"
                 for key in keys
             ),
         )
         for engine in ENGINES
     )
     note = (
-        f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage / true "
+        f"Mean and standard deviation over {len(case_data['damage'])} noise samples of {DURATION:g} s: damage / true "
         "damage, moments / I beta'' (rms), largest pitch error in rad."
     )
     heads = (
@@ -324,7 +324,7 @@ def tables(data: Saved) -> list[Table]:
     )
     loop = tuple(
         (("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{stated:.3e}")
-        for i, (law, stated) in enumerate(data["deviations"])
+        for i, (law, stated) in enumerate(case_data["deviations"])
     )
     return [
         Table("Stabilised runs, wrong model and noisy forces", note, heads, rows),

@@ -281,7 +281,7 @@ def _table_of_patches(placements: WheelsetPlacement) -> dict[str, Any]:
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Every patch of every position."""
     heads = (
         "shift [mm]",
@@ -300,21 +300,21 @@ def tables(data: dict[str, Any]) -> list[Table]:
             heads,
             tuple(
                 (f"{position_row['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
-                for position_row in data[name]
+                for position_row in case_data[name]
                 for wheel in WHEELS
                 for patch in position_row[wheel]
             ),
         )
         for name in ("A-1", "A-2")
-        if name in data
+        if name in case_data
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot mean position and force of the right wheel, together with CONTACT's."""
     from models.drawing.figures import BLUE, COLUMN_WIDTH, GREY, add_heading, legend_below, subplots
 
-    published = np.array(data["published"])
+    published = np.array(case_data["published"])
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.5))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
         axis.plot(
@@ -327,7 +327,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             label="CONTACT, all patches together",
         )
         points = [
-            (position_row["shift"], patch[value]) for position_row in data["A-2"] for patch in position_row["right"]
+            (position_row["shift"], patch[value])
+            for position_row in case_data["A-2"]
+            for patch in position_row["right"]
         ]
         axis.plot(*np.array(points).T, "o", markersize=4, color=BLUE, label="every patch here")
         axis.set_xlabel("displacement of the wheelset [mm]")

@@ -150,10 +150,10 @@ def _size(findings: Sequence[Finding], check: str, finding_place: str = "") -> f
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
-def _sized(key: str, quantity: str, size: float, unit: str, planted_size: float) -> Row:
+def _sized(key: str, quantity: str, size_found: float, unit: str, planted_size: float) -> Row:
     """Row that compares a found size with the size of the planted fault."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
-    return Observed(id, SYSTEM, quantity, size, unit).within(
+    return Observed(id, SYSTEM, quantity, size_found, unit).within(
         planted_size, SHARE * abs(planted_size), why, "closed form"
     )
 
@@ -309,12 +309,12 @@ def _moving_car(folder: Path) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the findings that the checks report to an engineer."""
-    rows = tuple((name, text) for name, text in data["said"].items())
+    rows = tuple((name, text) for name, text in case_data["said"].items())
     return [Table("What the checks say of planted faults", "The first sentence of each.", ("planted", "said"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """No figure."""
     return []

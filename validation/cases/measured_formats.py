@@ -60,15 +60,16 @@ def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
     return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
-def is_kept(source: Source) -> dict[str, bool]:
+def is_kept(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
-        "names": tuple(channel.name for channel in source.channels) == NAMES,
-        "units": tuple(channel.unit for channel in source.channels) == UNITS,
-        "comments": tuple(channel.comment for channel in source.channels) == COMMENTS and source.comment == COMMENT,
-        "start": source.start == START,
-        "quiet": source.noticed == (),
+        "names": tuple(channel.name for channel in measurement_source.channels) == NAMES,
+        "units": tuple(channel.unit for channel in measurement_source.channels) == UNITS,
+        "comments": tuple(channel.comment for channel in measurement_source.channels) == COMMENTS
+        and measurement_source.comment == COMMENT,
+        "start": measurement_source.start == START,
+        "quiet": measurement_source.noticed == (),
     }
 
 
@@ -93,15 +94,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"formats": lines}
 
 
-def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
+def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows: a file is written, read back block by block, and opened with the format's own library."""
-    truth, form = samples(), FORMATS[extension]
+    truth, form = samples(), FORMATS[file_extension]
     began = time.perf_counter()
     source = open_source(written(path, truth))
     blocks = list(source.blocks(NAMES, LENGTH))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
-    library, reading = LIBRARIES[extension]
+    library, reading = LIBRARIES[file_extension]
     foreign = reading(path)
     same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
     there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
@@ -111,7 +112,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
         largest_difference(there, truth),
     )
     lost = ", ".join(what for what, good in is_kept(source).items() if not good)
-    key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
+    key, why = f"measured_formats.{file_extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
         Observed(
             f"{key}.values",
@@ -119,7 +120,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             f"{form}: largest change of values that are written and read by block",
             error,
             "of the value",
-        ).at_most(RESOLUTION[extension], why, "closed form"),
+        ).at_most(RESOLUTION[file_extension], why, "closed form"),
         Observed(
             f"{key}.times", SYSTEM, f"{form}: largest change of times that are written and read", off, "s"
         ).at_most(1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
@@ -137,7 +138,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             f"{form}: difference of the values from those that {library} reads",
             by_library,
             "of the value",
-        ).at_most(RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
+        ).at_most(RESOLUTION[file_extension], f"{why}; names and units are compared, too", "native"),
     ], {
         "format": form,
         "library": library,
@@ -149,7 +150,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def two_rates(path: Path, extension: str) -> Row:
+def two_rates(path: Path, file_extension: str) -> Row:
     """Largest change of times and values of two groups with different rates, written to one file and read back."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
@@ -166,9 +167,9 @@ def two_rates(path: Path, extension: str) -> Row:
         for k, truth in ((0, period * np.arange(len(values_of))), (1, values_of))
     ]
     return Observed(
-        f"measured_formats.{extension[1:]}.rates",
+        f"measured_formats.{file_extension[1:]}.rates",
         SYSTEM,
-        f"{FORMATS[extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
+        f"{FORMATS[file_extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
         max(errors),
         "s or N",
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
@@ -270,9 +271,9 @@ print(count, next(line for line in open("{STATUS}") if line.startswith("VmHWM"))
 """
 
 
-def memory(path: Path, extension: str) -> list[Row]:
+def memory(path: Path, file_extension: str) -> list[Row]:
     """Rows: peak memory of a fresh process that reads five minutes of sixty channels block by block."""
-    key, form = f"measured_formats.{extension[1:]}.memory", FORMATS[extension]
+    key, form = f"measured_formats.{file_extension[1:]}.memory", FORMATS[file_extension]
     if not STATUS.exists():
         return [not_run(key, SYSTEM, f"{form}: peak memory", "this system does not tell the peak of a process")]
     count, base = 300_000, 1e3 * normal_samples(SEED, 2, 60_000, 60)
@@ -296,7 +297,7 @@ def memory(path: Path, extension: str) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of what each file format preserves."""
     note = (
         f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
@@ -312,7 +313,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{format_row['size'] / 1e3:.0f}",
             f"{format_row['rate'] / 1e6:.1f}",
         )
-        for format_row in data["formats"]
+        for format_row in case_data["formats"]
     )
     headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

@@ -297,14 +297,16 @@ def _trust_times() -> list[Row]:
     return rows
 
 
-def _drift_off(vehicle: CutVehicle, true_measurement: VirtualMeasurement, level: Level, path: int) -> float:
+def _drift_off(vehicle: CutVehicle, true_measurement: VirtualMeasurement, drift_level: Level, path: int) -> float:
     samples = true_measurement.run.wrenches.reshape(len(true_measurement.run.times), -1)
     forces = HubForces(
-        samples + (0.0 if level.bias is None else level.bias), true_measurement.step, true_frame(true_measurement)
+        samples + (0.0 if drift_level.bias is None else drift_level.bias),
+        true_measurement.step,
+        true_frame(true_measurement),
     )
-    deviation = np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
+    deviation = np.tile(np.repeat([drift_level.force, drift_level.moment], 3), len(vehicle.hubs))
     start = np.zeros(2 * vehicle.size)
-    start[[ROLL, PITCH]] = level.tilt
+    start[[ROLL, PITCH]] = drift_level.tilt
     run = hub_model(
         "mujoco",
         vehicle,
@@ -388,10 +390,10 @@ def _quick(folder: Path) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Mean damage of every section force, through every format."""
     tables = []
-    for name, means in data.items():
+    for name, means in case_data.items():
         elements = next(iter(means.values()))
         rows = tuple((element, *(f"{of_form[element]:.4f}" for of_form in means.values())) for element in elements)
         tables.append(

@@ -246,7 +246,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
 
 
 def _recovered_errors(
-    rule: str,
+    integration_rule: str,
     engine: str,
     array: SensorArray,
     specific_forces: np.ndarray,
@@ -265,7 +265,7 @@ def _recovered_errors(
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
         Observed(
-            f"motion.recovered.{rule}.{what}.{engine}",
+            f"motion.recovered.{integration_rule}.{what}.{engine}",
             SYSTEM,
             f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
@@ -362,11 +362,11 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     return [*rows, Observed("motion.held.growth", SYSTEM, what, late / early, "").within(1.0, 0.2, why, "closed form")]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the errors of a flat arrangement of sensors."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
-        for height, *gains in data["gains"]
+        for height, *gains in case_data["gains"]
     )
     note = (
         "Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
@@ -377,7 +377,7 @@ def tables(data: Saved) -> list[Table]:
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -386,14 +386,14 @@ def draw(data: Saved) -> Drawn:
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted_sensors(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
         left.loglog(heights, [array.noise_gains().max() for array in arrays], label=label)
-    height, _, spatial, _, plane = zip(*(line for line in data["gains"] if len(line) == 5), strict=True)
+    height, _, spatial, _, plane = zip(*(line for line in case_data["gains"] if len(line) == 5), strict=True)
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)
     left.set(
         title="Noise of the angular acceleration\nper noise of the readings [1/m]",
         xlabel="height of the fifth sensor above the others [m]",
     )
-    curves = data["curves"]
+    curves = case_data["curves"]
     for key, style, label in (
         ("integrated", "C0-", "integration alone"),
         ("law", "k--", "its law, sqrt(t)"),

@@ -84,15 +84,15 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"table": table, "steps": steps, "duration": duration}
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Largest state error by step."""
-    heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
+    heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in case_data["steps"]))
     rows = tuple(
         (engine, name, *(f"{value:.2e}" for value in errors_of_steps))
-        for engine, name, *errors_of_steps in data["table"]
+        for engine, name, *errors_of_steps in case_data["table"]
     )
     note = (
-        f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
+        f"Largest error of any state (m, rad, m/s, rad/s) over the first {case_data['duration']:g} s. Equal rows are "
         "the same method."
     )
     return [Table(TITLE, note, heads, rows)]

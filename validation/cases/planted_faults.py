@@ -60,29 +60,29 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*rows, *([] if quick else [_row_of_fault_count(data)])], data
 
 
-def _row_of_fault_count(data: Saved) -> Row:
-    caught = sum(line[3] != "none" for line in _lines(data))
+def _row_of_fault_count(case_data: Saved) -> Row:
+    caught = sum(line[3] != "none" for line in _lines(case_data))
     return Observed(
         "planted.count",
         FAULT_SYSTEM,
         f"shortfall of the number of faults that are caught in all systems from {FEWEST_FAULTS}",
         max(0, FEWEST_FAULTS - caught),
         "faults",
-    ).at_most(0, f"{caught} of {len(_lines(data))} are", "native")
+    ).at_most(0, f"{caught} of {len(_lines(case_data))} are", "native")
 
 
-def _lines(data: Saved) -> list[tuple[str, ...]]:
+def _lines(case_data: Saved) -> list[tuple[str, ...]]:
     """Table lines, one for each fault: system, the part with the fault, fault, checks that see it, checks that had
     missed it."""
     return [
-        *pitch_plane.lines(data["pitch-plane"]),
-        *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
+        *pitch_plane.lines(case_data["pitch-plane"]),
+        *(line for campaign in CAMPAIGNS for line in campaign.lines(case_data[campaign.id])),
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of all faults, then tables for each system with errors and descriptions of the checks."""
-    lines = _lines(data)
+    lines = _lines(case_data)
     systems = len({line[0] for line in lines})
     note = (
         f"{len(lines)} faults in {systems} systems, one at a time. Each check in the last column, had it been the "
@@ -92,11 +92,11 @@ def tables(data: Saved) -> list[Table]:
     overview = Table("Planted faults of all systems", note, headings, tuple(lines))
     return [
         overview,
-        *pitch_plane.tables(data["pitch-plane"]),
-        *(campaign.table(data[campaign.id]) for campaign in CAMPAIGNS),
+        *pitch_plane.tables(case_data["pitch-plane"]),
+        *(campaign.table(case_data[campaign.id]) for campaign in CAMPAIGNS),
     ]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot how far above its tolerance each check's error is for every fault of the pitch plane."""
-    return pitch_plane.draw(data["pitch-plane"])
+    return pitch_plane.draw(case_data["pitch-plane"])

@@ -89,10 +89,10 @@ def _exponential(matrix: Matrix) -> Matrix:
     return _power(total, 2**20)
 
 
-def _continuous_error(damped: float) -> float:
+def _continuous_error(damping_rate: float) -> float:
     """Relative error of the continuous covariance, which obeys d/dt (Pxx, Pxv, Pvv) = (2 Pxv, Pvv - eta Pxv, s^2 - 2
     eta Pvv)."""
-    eta = damped / TIME
+    eta = damping_rate / TIME
     with localcontext(prec=DIGITS):
         e, t = Decimal(eta), Decimal(TIME)
         gain = Decimal(DEVIATION) ** 2 * Decimal(STEP) / Decimal(MASS) ** 2
@@ -106,11 +106,11 @@ def _continuous_error(damped: float) -> float:
         return _largest_relative_error(continuous_covariance(TIME, DEVIATION, STEP, MASS, eta), truth)
 
 
-def _discrete_error(damped: float, steps: int) -> float:
+def _discrete_error(damping_rate: float, steps: int) -> float:
     """Relative error of the discrete covariance, compared with the matrix recursion of an Euler step in many digits.
     ``steps`` of these steps make TIME."""
     step = TIME / steps
-    eta = min(damped / TIME, 1.9 / step)
+    eta = min(damping_rate / TIME, 1.9 / step)
     with localcontext(prec=DIGITS):
         d = Decimal(step)
         r, kick = 1 - Decimal(eta) * d, (Decimal(DEVIATION) * d / Decimal(MASS)) ** 2
@@ -131,27 +131,27 @@ def _largest_relative_error(computed_values: np.ndarray, truth: Sequence[Decimal
     )
 
 
-def _difference(damped: float, steps: int) -> float:
+def _difference(damping_rate: float, steps: int) -> float:
     """1 - ratio of the discrete to the continuous variance of the position."""
     step = TIME / steps
-    arguments = (DEVIATION, step, MASS, damped / TIME)
+    arguments = (DEVIATION, step, MASS, damping_rate / TIME)
     return 1 - float(euler_covariance(steps, *arguments)[0, 0] / continuous_covariance(TIME, *arguments)[0, 0])
 
 
-def _monte_carlo(damped: float, path_count: int) -> list[Row]:
+def _monte_carlo(damping_rate: float, path_count: int) -> list[Row]:
     """Rows: Monte Carlo variance of the position, and mean square of position and velocity together, weighted by the
     inverse covariance of the law."""
     steps = 1000
-    arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
+    arguments = (DEVIATION, STEP, MASS, damping_rate / (steps * STEP))
     law, drawn = euler_covariance(steps, *arguments), monte_carlo_errors(path_count, steps, *arguments, seed=SEED)
     distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
     why = f"{path_count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
             Observed(
-                f"point_mass.position.{damped:g}",
+                f"point_mass.position.{damping_rate:g}",
                 SYSTEM,
-                f"variance of the position by Monte Carlo, product of damping and time {damped:g}",
+                f"variance of the position by Monte Carlo, product of damping and time {damping_rate:g}",
                 float(np.mean(drawn[:, 0] ** 2)),
                 "m^2",
             ),
@@ -161,10 +161,10 @@ def _monte_carlo(damped: float, path_count: int) -> list[Row]:
         ),
         mean_square(
             Observed(
-                f"point_mass.joint.{damped:g}",
+                f"point_mass.joint.{damping_rate:g}",
                 SYSTEM,
                 "half the mean squared distance, which tests the whole covariance by Monte Carlo, "
-                f"product of damping and time {damped:g}",
+                f"product of damping and time {damping_rate:g}",
                 distance,
                 "",
             ),
@@ -175,9 +175,9 @@ def _monte_carlo(damped: float, path_count: int) -> list[Row]:
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of the relative errors of both covariances."""
-    rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
+    rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in case_data["errors"].items())
     note = (
         f"Worst entry of the covariance against {DIGITS} digits, over damping times time. Ten steps cannot be "
         "stable at 100: there the damping is that of 1.9 per step."
@@ -185,7 +185,7 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
@@ -199,7 +199,7 @@ def draw(data: Saved) -> Drawn:
         axes[0].loglog(step_counts * STEP, euler, "o", color=f"C{i}", markersize=3.5)
     axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
-    steps, *columns = np.array(data["differences"]).T
+    steps, *columns = np.array(case_data["differences"]).T
     for x, column in zip((0, 1, 10), columns, strict=True):
         axes[1].loglog(steps, np.abs(column), "o-", markersize=3.5, label=f"damping times time {x}")
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")

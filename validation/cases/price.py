@@ -184,24 +184,24 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     return rows
 
 
-def _speed_rows(data: Saved) -> list[Row]:
+def _speed_rows(case_data: Saved) -> list[Row]:
     """Rows on target speeds, reported with their intervals and without a verdict."""
     rows = [
         Observed(
             "price.callback.gap",
             SYSTEM,
             "MuJoCo RK4: difference between every force in a compiled callback and native springs",
-            data["callback"]["RK4"]["gap"],
+            case_data["callback"]["RK4"]["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
     ]
-    for integrator, figures in data["callback"].items():
+    for integrator, figures in case_data["callback"].items():
         for key, words in CALLBACKS.items():
             ratio, low, high = figures[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
             what = f"MuJoCo {integrator}, {words}, paired seconds, 95 % interval {low:.3f} to {high:.3f}"
             rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
-    return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
+    return rows + [_real_time(key, case_data["real time"][key]) for key in ("with table", "without table")]
 
 
 def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
@@ -214,20 +214,20 @@ def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
     return Observed(name, SYSTEM, quantity, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
     tables = [
         table
-        for saved in data["problems"]
-        for table in (*cost_tables(runner.of_saved(saved)), *split.table(data["split"], saved["key"]))
+        for saved in case_data["problems"]
+        for table in (*cost_tables(runner.of_saved(saved)), *split.table(case_data["split"], saved["key"]))
     ]
-    return [*tables, ride.table(data["ride"])]
+    return [*tables, ride.table(case_data["ride"])]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """A work-precision figure per problem, and one of the routes of ride."""
-    problems = map(runner.of_saved, data["problems"])
-    return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(data["ride"])]
+    problems = map(runner.of_saved, case_data["problems"])
+    return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(case_data["ride"])]
 
 
 def _caption(measured_points: runner.MeasuredPoints) -> str:

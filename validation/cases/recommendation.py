@@ -137,14 +137,14 @@ def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     ]
 
 
-def _slower(every: list[Verdict], kind: str) -> int:
-    return sum(verdict.slower for verdict in every if verdict.kind == kind)
+def _slower(every: list[Verdict], cost_kind: str) -> int:
+    return sum(verdict.slower for verdict in every if verdict.kind == cost_kind)
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Every scene with what was recommended over all engines."""
     rows = []
-    for of_scene in data["verdicts"]:
+    for of_scene in case_data["verdicts"]:
         if not of_scene:
             continue
         verdict = of_scene[0]
@@ -166,12 +166,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Recommendations for scenes drawn at random", note, heads, tuple(rows))]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
     from models.drawing.figures import COLOURS, DARK, LABELS, REJECTED_COLOUR, add_heading, subplots
 
     figure, ax = subplots(figsize=(6.0, 4.6))
-    every = [verdict for of_engine in data["verdicts"] for verdict in of_engine]
+    every = [verdict for of_engine in case_data["verdicts"] for verdict in of_engine]
     for engine in dict.fromkeys(verdict["curve"].split()[0] for verdict in every):
         of_engine = [verdict for verdict in every if verdict["curve"].startswith(engine)]
         ax.plot(
@@ -205,6 +205,6 @@ def draw(data: Saved) -> Drawn:
     )
     ax.legend(loc="upper left")
     add_heading(
-        figure, f"Settings recommended for scenes never seen ({len(data['verdicts'])}): errors predicted and true"
+        figure, f"Settings recommended for scenes never seen ({len(case_data['verdicts'])}): errors predicted and true"
     )
     return [("Errors of recommended settings: predicted by the search, and true by another solver.", figure)]

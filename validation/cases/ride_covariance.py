@@ -232,11 +232,11 @@ def _engine_row(engine: str) -> Row:
     ).at_most(1e-6, "asked", "native")
 
 
-def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
+def _fast(speeds: np.ndarray, vehicle_name: str) -> tuple[list[Row], dict[str, Any]]:
     """Rows and data on the fast route: five cases of correlation over many speeds with weighting, by the fast and the
     direct route, with processor times."""
     vehicle = _vehicle("r19_ride")
-    linear = linear_vehicle(vehicle, source)
+    linear = linear_vehicle(vehicle, vehicle_name)
     roads = five_cases(linear(20.0).wheels)
     variance_sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
@@ -266,7 +266,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             "ride_covariance.fast.time",
             SYSTEM,
             f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
-            f"of {source}, single core, measured once",
+            f"of {vehicle_name}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),
@@ -284,7 +284,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
 BODY_POINTS = ("body front", "body centre", "body rear")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the agreement between two routes, with the error that each states."""
     rows = tuple(
         (
@@ -294,7 +294,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{route['worst']:.1e}",
             *(f"{error:.1e}" for error in route["errors"]),
         )
-        for route in data["routes"]
+        for route in case_data["routes"]
     )
     note = (
         "Largest relative difference of standard deviations over all outputs in the five cases of correlation; the "
@@ -304,11 +304,11 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Covariance against frequency quadrature", note, headings, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
-    shown = data["figure"]
+    shown = case_data["figure"]
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.2), sharey=True)
     for axis, body_point in zip(axes, BODY_POINTS, strict=True):
         for i, case in enumerate(shown["cases"]):

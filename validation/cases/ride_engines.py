@@ -246,13 +246,13 @@ def _without_curves() -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of computing times for one simulated second."""
-    if not data["price"]:
+    if not case_data["price"]:
         return []
     note = (
         "CPU milliseconds, once, per simulated second of R19-ride, RK4 at 1 ms on a random road, and functions "
         "called back."
     )
     heads = ("engine", "springs", "ms per s", "callbacks")
-    return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in data["price"]))]
+    return [Table("R19-ride in time", note, heads, tuple(tuple(row) for row in case_data["price"]))]

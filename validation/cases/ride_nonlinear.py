@@ -145,13 +145,13 @@ def _fixed_point() -> list[Row]:
     ]
 
 
-def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
+def _level(road_level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Rows at one road level: deviations and mean travel by statistical linearisation, compared with Monte Carlo. The
     tolerance of each is the accuracy that the result's sentences state."""
-    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, level)
+    vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
     copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
-    rows, cells = [], [f"{level:g}"]
+    rows, cells = [], [f"{road_level:g}"]
     for i, name in enumerate(copies.names):
         error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
         spread = float(copies.error[i] / copies.variance[i] / 2.0)
@@ -160,10 +160,10 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
         )
         rows.append(
             Observed(
-                f"ride_nonlinear.level.{level:g}.{name}",
+                f"ride_nonlinear.level.{road_level:g}.{name}",
                 SYSTEM,
                 f"relative difference of the deviation of {name} from {len(copies.moments[0])} copies "
-                f"of {copies.duration:.0f} s, {level:g} times the paper's road",
+                f"of {copies.duration:.0f} s, {road_level:g} times the paper's road",
                 abs(error),
                 "",
             ).at_most(
@@ -178,7 +178,7 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     shift = float(linear.mean[travel] - copies.mean[travel]) / size
     rows.append(
         Observed(
-            f"ride_nonlinear.mean.{level:g}",
+            f"ride_nonlinear.mean.{road_level:g}",
             SYSTEM,
             f"difference of the mean travel, {1e3 * linear.mean[travel]:.2f} mm, from that of the "
             "copies, over its deviation",
@@ -245,11 +245,13 @@ def _alone() -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the errors of statistical linearisation."""
     names = [output.name for output in vehicle_and_road(NONLINEAR_VEHICLE)[0].outputs]
     note = (
         "Error of each standard deviation beside Monte Carlo; in brackets what was left out of the variance, and "
         "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper."
     )
-    return [Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in data["levels"]))]
+    return [
+        Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in case_data["levels"]))
+    ]

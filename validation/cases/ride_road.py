@@ -312,9 +312,9 @@ def _weighted_rows() -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """The five input covariances, the weightings beside the standard's table, and the fits."""
-    return [_inputs_table(), _weighting_table(), fits_table([data["made"], *data["measured"]])]
+    return [_inputs_table(), _weighting_table(), fits_table([case_data["made"], *case_data["measured"]])]
 
 
 def _inputs_table() -> Table:
@@ -339,6 +339,6 @@ def _weighting_table() -> Table:
     return Table("Weightings of ISO 2631-1", note, heads, tuple(rows))
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra and coherency of model, made and measured roads."""
-    return [coherency_figure(HALF_TRACK, [data["made"], *data["measured"]])]
+    return [coherency_figure(HALF_TRACK, [case_data["made"], *case_data["measured"]])]

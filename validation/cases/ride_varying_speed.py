@@ -310,11 +310,11 @@ def _path_points(profile: SpeedProfile, cuts: list[float], lengths: tuple[float,
     return (cells[:-1, None] + half * (points + 1.0)).ravel(), (half * weights).ravel()
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of the deviations of the Monte Carlo copies in standard errors (z), at each instant."""
     rows = [
         (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
-        for name, drive in data.items()
+        for name, drive in case_data.items()
         for t, z in zip(drive["instants"], drive["z"], strict=True)
     ]
     if not rows:
@@ -323,14 +323,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Monte Carlo at varying speed", note, ("drive", "time", *POINTS), tuple(rows))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot standard deviations over time, with the quasi-stationary solution for comparison."""
-    if not data:
+    if not case_data:
         return []
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9), sharey=True)
-    for axis, (name, drive) in zip(axes, data.items(), strict=True):
+    for axis, (name, drive) in zip(axes, case_data.items(), strict=True):
         for column, point in enumerate(POINTS):
             pick = [row[column] for row in drive["deviation"]]
             (line,) = axis.plot(drive["time"], pick, label=point)

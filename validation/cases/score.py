@@ -249,11 +249,11 @@ def _scored(bench: Bench, name: str, engine: str = "reference") -> Saved:
     return bench.row(name, effects, bench.simulate(engine, effects))
 
 
-def _beside(long: list[Saved]) -> list[Row]:
+def _beside(long_runs: list[Saved]) -> list[Row]:
     """Rows: pitch errors and damage ratios over 60 s, reported next to the prototype's; a tumbled run has no damage
     ratio."""
     rows = []
-    for row in long:
+    for row in long_runs:
         pitch, upright, along = PROTOTYPE[row["method"]]
         name = _slug(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
@@ -272,10 +272,10 @@ def _beside(long: list[Saved]) -> list[Row]:
     return rows
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Tables of every stabiliser on both roads, and over 60 s compared with the prototype."""
     tables = []
-    shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
+    shown = {"Stabilisers compared": case_data["study"], "Stabilisers over 60 s at 1 kHz": case_data["prototype"]}
     for title, rows in shown.items():
         if rows:
             note = (
@@ -317,13 +317,13 @@ def _cells(row: Saved) -> tuple[str, ...]:
     )
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot the study's score of the stabilisers."""
-    if not data["study"]:
+    if not case_data["study"]:
         return []
     from models.drawing.drift import decision_figure
 
     scene = load(SCENE)
     options = read(Options, scene.options, "", "options")
-    rows = [row for row in data["study"] if row["engine"] == "reference"]
+    rows = [row for row in case_data["study"] if row["engine"] == "reference"]
     return [("What each stabiliser leaves in the section forces", decision_figure(rows, options.limits, options.grade))]

@@ -178,10 +178,10 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     ]
 
 
-def tables(data: Saved) -> list[Table]:
+def tables(case_data: Saved) -> list[Table]:
     """Table of all samples, sorted by the ratio of the true to the stated error, largest first."""
     known = sorted(
-        (sample for sample in data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
+        (sample for sample in case_data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
     )
     rows = tuple(
         (
@@ -202,12 +202,12 @@ def tables(data: Saved) -> list[Table]:
     return [Table("Stated and true errors", note, heads, rows)]
 
 
-def draw(data: Saved) -> Drawn:
+def draw(case_data: Saved) -> Drawn:
     """Plot true error over stated error, both divided by the channel's standard deviation."""
     from models.drawing.figures import CURVE_COLOURS, GREY, ORANGE, REJECTED_COLOUR, add_heading, subplots
 
     figure, axis = subplots(figsize=(6.5, 5.0))
-    known = [sample for sample in data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
+    known = [sample for sample in case_data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
     for name, colour in zip(
         dict.fromkeys(sample["system"] for sample in known), (*CURVE_COLOURS, REJECTED_COLOUR), strict=False
     ):

@@ -348,11 +348,11 @@ def _fault_rows() -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(case_data: dict[str, Any]) -> list[Table]:
     """Critical speeds and limit cycles."""
     speeds = tuple(
         (name, *("none" if v is None else f"{v:.9g}" for v in of_engine.values()))
-        for name, of_engine in data["critical"].items()
+        for name, of_engine in case_data["critical"].items()
     )
     cycles = tuple(
         (
@@ -364,7 +364,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{o['frequency']:.8f}",
             f"{o['frequency_error']:.0e}",
         )
-        for name, of_engine in data["cycles"].items()
+        for name, of_engine in case_data["cycles"].items()
         for engine, o in of_engine.items()
     )
     note = "In m/s, with linear creep; parameters drawn at random but for the chosen ones."

@@ -35,9 +35,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return [*_laws(states), *_hubs(states, duration), *_rolling(states, duration)], {}
 
 
-def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
+def _row(id: str, quantity: str, largest_error: float, unit: str, bound: float) -> Row:
     """Row that compares the plain equations with another implementation of the same laws."""
-    return Observed(f"written.{id}", SYSTEM, quantity, value, unit).at_most(bound, WHY, "native")
+    return Observed(f"written.{id}", SYSTEM, quantity, largest_error, unit).at_most(bound, WHY, "native")
 
 
 def _laws(states: int) -> list[Row]:

@@ -41,33 +41,34 @@ def _misread_text(error: Exception) -> str:
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _rows_by_id(content: Saved) -> dict[str, Saved]:
+def _rows_by_id(report_content: Saved) -> dict[str, Saved]:
     """Rows by id; raises ValueError if two rows have the same id, because only one of them would be compared."""
-    saved = map(of_saved, content["rows"])
+    saved = map(of_saved, report_content["rows"])
     rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
-    if len(rows) < len(content["rows"]):
+    if len(rows) < len(report_content["rows"]):
         raise ValueError("an id stands there twice")
     return rows
 
 
-def _provenance_tables(content: Saved) -> Saved:
+def _provenance_tables(report_content: Saved) -> Saved:
     """Provenance of the rows, as tables."""
-    tables = dict(content["provenance"])
+    tables = dict(report_content["provenance"])
     return tables | {name: dict(tables.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Saved) -> Saved:
+def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], report_source: Saved) -> Saved:
     """Comparison with an earlier report, for ``results.json``: the earlier file and commit, notes, and all changed
     rows.
 
-    source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
+    report_source : provenance of the rows; the notes say where that of the earlier report differs in what numbers
+    depend on.
     """
     was = earlier_report["provenance"]
-    old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
+    old, new = (("quick" if report.get("quick") else "full") for report in (was, report_source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
     notes += [
         f"{name} {earlier_text} -> {current_text}"
-        for name, earlier_text, current_text in _differing_environment(was, source)
+        for name, earlier_text, current_text in _differing_environment(was, report_source)
     ]
     return {
         "file": earlier_report["file"],
@@ -77,19 +78,19 @@ def comparison_with_earlier(earlier_report: Saved, rows: list[Saved], source: Sa
     }
 
 
-def _differing_environment(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
+def _differing_environment(was: Saved, report_source: Saved) -> Iterator[tuple[str, Any, Any]]:
     """Versions, seeds, Python, machine and system in which both reports differ, in the order of the earlier report."""
     for name in ("versions", "seeds"):
-        old, new = was.get(name) or {}, source.get(name) or {}
+        old, new = was.get(name) or {}, report_source.get(name) or {}
         yield from (
             (f"{name[:-1]} of {key}", old.get(key), new.get(key))
             for key in {**old, **new}
             if old.get(key) != new.get(key)
         )
     yield from (
-        (name, was.get(name), source.get(name))
+        (name, was.get(name), report_source.get(name))
         for name in ("python", "machine", "system")
-        if was.get(name) != source.get(name)
+        if was.get(name) != report_source.get(name)
     )
 
 
@@ -114,16 +115,16 @@ def _status_rank(status: Any) -> int:
 def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> Iterator[Change]:
     row = new_row or old_row or {}
 
-    def change(kind: str, old_value: Any, new_value: Any, size: float = 0.0) -> Change:
+    def change(change_kind: str, old_value: Any, new_value: Any, change_size: float = 0.0) -> Change:
         return {
             "id": id,
-            "kind": kind,
+            "kind": change_kind,
             "quantity": row["quantity"],
             "unit": row["unit"],
             "before": old_value,
             "after": new_value,
-            "size": size,
-            "reason": row["reason"] if kind in ("status", "new") else "",
+            "size": change_size,
+            "reason": row["reason"] if change_kind in ("status", "new") else "",
         }
 
     if old_row is None or new_row is None:
@@ -139,8 +140,8 @@ def _changes_of_row(id: str, old_row: Saved | None, new_row: Saved | None) -> It
         yield change("value", old_row["value"], new_row["value"], size)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def _is_number(row_value: Any) -> bool:
+    return isinstance(row_value, int | float) and not isinstance(row_value, bool)
 
 
 def _values_differ(old_value: Any, new_value: Any) -> bool:
@@ -183,5 +184,5 @@ def change_lines(compared: Saved) -> list[str]:
     return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *lines]
 
 
-def _value_text(value: Any) -> str:
-    return "-" if value is None else f"{value:.6g}" if _is_number(value) else str(value)
+def _value_text(row_value: Any) -> str:
+    return "-" if row_value is None else f"{row_value:.6g}" if _is_number(row_value) else str(row_value)

@@ -21,10 +21,10 @@ MOMENTS_TRIED = 20
 
 
 @contextmanager
-def files_of_at_most(size: int) -> Iterator[None]:
-    """Context in which no file of this process can grow beyond ``size`` bytes."""
+def files_of_at_most(byte_limit: int) -> Iterator[None]:
+    """Context in which no file of this process can grow beyond ``byte_limit`` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (byte_limit, hard))
     try:
         yield
     finally:

@@ -18,14 +18,14 @@ class Right:
 
     order, adaptive = 8, True
 
-    def integrate(self, rate_function: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def integrate(self, rate_function: Any, times: np.ndarray, start_state: np.ndarray, tolerance: float) -> np.ndarray:
         """States (len(times), 8) of y' = f(t, y)."""
 
         def rate(t: float, y: np.ndarray) -> np.ndarray:
             return self.weighed(rate_function(t, y))
 
         solution = solve_ivp(
-            rate, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
+            rate, times[[0, -1]], start_state, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
         )
         return self.told(solution.y.T)
 
@@ -51,9 +51,9 @@ class Boastful:
 
     order, adaptive = 4, False
 
-    def integrate(self, rate_function: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def integrate(self, rate_function: Any, times: np.ndarray, start_state: np.ndarray, tolerance: float) -> np.ndarray:
         """States by one Euler step between each two times."""
-        states = [start]
+        states = [start_state]
         for begin, end in pairwise(times):
             states.append(states[-1] + (end - begin) * rate_function(begin, states[-1]))
         return np.array(states)
@@ -90,8 +90,8 @@ def integrators_that_pass(integrator_kinds: tuple[type, ...] = WRONG_ENGINES, du
             table.update(saved_table)
 
 
-def _gives_answer(kind: type, duration: float) -> bool:
-    name = f"{__name__}:{kind.__name__}"
+def _gives_answer(integrator_kind: type, duration: float) -> bool:
+    name = f"{__name__}:{integrator_kind.__name__}"
     register(name)
     try:
         simulate(road_scene(duration=duration), name)

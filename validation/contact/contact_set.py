@@ -78,18 +78,25 @@ def wide_contacts(part_number: int) -> list[ContactCase]:
 
 
 def _draw_contacts(
-    stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[MaterialPair], absent: float = 0.0
+    stream: int,
+    count: int,
+    ratios: Ends,
+    size_ends: Ends,
+    contact_kind: str,
+    material_pairs: list[MaterialPair],
+    absent: float = 0.0,
 ) -> list[ContactCase]:
     """Random contacts from a stream of numbers, with the material pairs in turn. Each creepage is zero in a share of
     the contacts, but never all three."""
     rng = np.random.default_rng((SEED, stream))
-    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, sizes))
+    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, size_ends))
     directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent
     present[~present.any(axis=1)] = True
     parts = map(tuple, (directions * present).tolist())
-    drawn = zip(ratio, level, parts, cycle(pairs), strict=False)
+    drawn = zip(ratio, level, parts, cycle(material_pairs), strict=False)
     return [
-        ContactCase(*_semi_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn
+        ContactCase(*_semi_axes(a_by_b), LOAD, FRICTION, pair, contact_kind, part, size)
+        for a_by_b, size, part, pair in drawn
     ]
 
 

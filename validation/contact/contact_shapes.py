@@ -220,12 +220,12 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     return heights
 
 
-def exact_normal(shape: Shape, cells: int, box: Box) -> NormalSolution:
+def exact_normal(contact_shape: Shape, cells: int, box: Box) -> NormalSolution:
     """Exact normal contact on a grid of cells x cells over the box x0, x1, y0, y1 (m)."""
     x0, x1, y0, y1 = box
     x, y = (low + (np.arange(cells) + 0.5) / cells * (high - low) for low, high in ((x0, x1), (y0, y1)))
-    heights = shape.distance.at(x[None, :], y[:, None])
-    solution = solve_normal(heights, x[1] - x[0], y[1] - y[0], PAIR, load=shape.load)
+    heights = contact_shape.distance.at(x[None, :], y[:, None])
+    solution = solve_normal(heights, x[1] - x[0], y[1] - y[0], PAIR, load=contact_shape.load)
     return replace(solution, x=x, y=y)
 
 

@@ -137,14 +137,15 @@ def _choice_for(tolerance: float) -> Recommendation:
 
 
 def _largest_winner(
-    size: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
+    size_of: Callable[[SettingChoice, float], float], kind: str = "", tolerances: tuple[float, ...] = (TIGHT_TOLERANCE,)
 ) -> float:
-    """Largest ``size`` among the recommended settings of one kind of cost, over all tolerances; infinite where none is
-    recommended."""
+    """Largest ``size_of`` among the recommended settings of one kind of cost, over all tolerances; infinite where none
+    is recommended.
+    """
     return max(
         max(
             (
-                size(choice, tolerance)
+                size_of(choice, tolerance)
                 for (_, cost_kind), choice in _choice_for(tolerance).winners.items()
                 if cost_kind.startswith(kind)
             ),
@@ -203,12 +204,12 @@ def _tenfold_smaller_errors(original: Any) -> Any:
     return planted
 
 
-def _by_error(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
-    return min(timed, key=lambda choice: choice.error, default=None)
+def _by_error(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
+    return min(timed_choices, key=lambda choice: choice.error, default=None)
 
 
-def _dearest_choice(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
-    return max(timed, key=lambda choice: choice.calls, default=None)
+def _dearest_choice(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
+    return max(timed_choices, key=lambda choice: choice.calls, default=None)
 
 
 def _mean_error(self: ReferenceTruth, other_answer: PricedRun) -> float:

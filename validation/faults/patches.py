@@ -69,10 +69,10 @@ def index_of_the_end(original: Any) -> Any:
 def truncated_time(original: Any) -> Any:
     """Fault: in the table of half steps the row number is truncated instead of rounded."""
 
-    def reader(clock: Any, column: int, scale: float) -> Any:
+    def reader(clock: Any, column: int, time_scale: float) -> Any:
         if not clock.table:
-            return original(clock, column, scale)
-        return lambda mbs, t, load: scale * clock.table[column][int(t * clock.per_time)]
+            return original(clock, column, time_scale)
+        return lambda mbs, t, load: time_scale * clock.table[column][int(t * clock.per_time)]
 
     return reader
 

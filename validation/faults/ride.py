@@ -187,9 +187,9 @@ def _reversed(original: Any) -> Any:
 
 
 def _on_front_track(original: Any) -> Any:
-    def row(wheel: WheelPosition, mean: Any, roll: Any, word: str, wheels: tuple[WheelPosition, ...]) -> Any:
+    def row(wheel: WheelPosition, mean: Any, roll: Any, left_right_word: str, wheels: tuple[WheelPosition, ...]) -> Any:
         y = np.copysign(abs(wheels[0].y), wheel.y)
-        return original(replace(wheel, y=y), mean, roll, word, wheels)
+        return original(replace(wheel, y=y), mean, roll, left_right_word, wheels)
 
     return row
 

@@ -92,7 +92,7 @@ CHECKS = {
 ALL_WHEELS = (0, 1, 2, 3)
 
 
-def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), offset: float = 0.0) -> Patch:
+def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), shift: float = 0.0) -> Patch:
     """Fault: a number of the tyres is multiplied by a factor and shifted by an offset in the table."""
 
     def table(original: Any) -> Any:
@@ -100,7 +100,7 @@ def tyre(column: int, factor: float, index: tuple[int, ...] = (0,), offset: floa
             numbers: np.ndarray = original(car)
             for i in index:
                 index_in_table = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
-                numbers[index_in_table] = factor * numbers[index_in_table] + offset
+                numbers[index_in_table] = factor * numbers[index_in_table] + shift
             return numbers
 
         return planted
@@ -116,7 +116,7 @@ FAULTS = tuple(
         ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL_WHEELS)),
         ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
         ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
-        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, offset=9e-3)),
+        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, shift=9e-3)),
     )
 )
 

@@ -183,15 +183,15 @@ def _measured_forces() -> Sampled:
     return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
 
 
-def growth(engine: str, mode: Mode) -> float:
+def growth(engine: str, drive_mode: Mode) -> float:
     """Factor by which a pitch error of 1e-6 rad grows over the drive."""
     base = vehicle()
     start = base.initial.copy()
     start[3] += 1e-6
     ends = [
-        run(engine, driven_by_forces(replace(base, initial=y), _measured_forces(), mode), 1e-3, DRIVE_DURATION).states[
-            -1, 3
-        ]
+        run(
+            engine, driven_by_forces(replace(base, initial=y), _measured_forces(), drive_mode), 1e-3, DRIVE_DURATION
+        ).states[-1, 3]
         for y in (base.initial, start)
     ]
     return abs(ends[1] - ends[0]) / 1e-6

@@ -27,21 +27,23 @@ SLOW_PERIOD = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
 
 
-def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
+def _largest_pitch_error(
+    engine: str, folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
+) -> float:
     """Ratio of the largest pitch error to its stated deviation for a vehicle at rest, with the pitch missing in the
-    ``lost`` samples.
+    ``lost_samples`` samples.
 
-    The filter starts from a pitch that is ``turn`` (rad) wrong.
+    The filter starts from a pitch that is ``turn_deviation`` (rad) wrong.
     """
     count = round(DURATION / PERIOD) + 1
     base = vehicle()
     forces = static_forces(base, count, PERIOD, is_held=False).values
     write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
     measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
-    measured_pitch[lost] = np.nan
+    measured_pitch[lost_samples] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, PERIOD)
     p, start = base.parameters, base.initial.copy()
-    start[[0, 1, 3]] += turn * np.array([-p.b, p.a, 1.0])
+    start[[0, 1, 3]] += turn_deviation * np.array([-p.b, p.a, 1.0])
     scene = build(
         {
             "title": "kalman",
@@ -57,7 +59,7 @@ def _largest_pitch_error(engine: str, folder: Path, lost: slice, turn: float = 0
         folder,
     )
     run = simulate(scene, engine)
-    ended = PERIOD * (lost.stop or 0)
+    ended = PERIOD * (lost_samples.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 

@@ -215,9 +215,9 @@ class StraightLinePitch:
         """Sampling period (s) of the prescribed pitch."""
         return self.period
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Angle, rate and 0 (for the second derivative) at start + i step."""
-        position = np.round((start + step * np.arange(sample_count)) / self.period, 9)
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Angle, rate and 0 (for the second derivative) at start_time + i step."""
+        position = np.round((start_time + step * np.arange(sample_count)) / self.period, 9)
         index = np.minimum(position.astype(int), len(self.angles) - 2)
         slope = np.diff(self.angles)[index]
         return np.column_stack([self.angles[index] + (position - index) * slope, slope / self.period, 0 * slope])

@@ -18,7 +18,7 @@ SIZE = 0.2
 
 
 def spoilt(
-    check: str, expected_place: str, size: float | None, spoil: bench.Spoil | None = None, **faults: Any
+    check: str, expected_place: str, fault_size: float | None, spoil: bench.Spoil | None = None, **faults: Any
 ) -> Callable[[str, Path], float]:
     """Case: a recording with one fault. Error: that of the size found; infinite unless ``check`` reports it first, and
     all findings name ``expected_place``."""
@@ -31,7 +31,7 @@ def spoilt(
             or not all(expected_place in finding.place for finding in findings)
         ):
             return np.inf
-        return 0.0 if size is None else abs((findings[0].size or 0.0) / size - 1.0)
+        return 0.0 if fault_size is None else abs((findings[0].size or 0.0) / fault_size - 1.0)
 
     return error
 

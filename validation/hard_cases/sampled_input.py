@@ -102,9 +102,9 @@ class ByTime(Sampled):
     """Faulty held samples: every stage reads the sample at its own time, so that the last stage of a step reads the
     next sample."""
 
-    def sample(self, start: float, step: float, sample_count: int) -> np.ndarray:
-        """Values at start + i step."""
-        periods = (start + step * np.arange(sample_count)) / self.period
+    def sample(self, start_time: float, step: float, sample_count: int) -> np.ndarray:
+        """Values at start_time + i step."""
+        periods = (start_time + step * np.arange(sample_count)) / self.period
         return self.values[np.floor(periods + SNAP_SHARE).astype(int).clip(0, len(self.values) - 1)]
 
 

@@ -45,9 +45,9 @@ def vehicle(
     return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
 
 
-def driven_by_forces(base_assembly: Assembly, forces: Signal, mode: Mode = "force") -> Assembly:
+def driven_by_forces(base_assembly: Assembly, forces: Signal, drive_mode: Mode = "force") -> Assembly:
     """The vehicle without its road, driven by two wheel forces (N)."""
-    return base_assembly.without_tyres().with_input(mode, forces)
+    return base_assembly.without_tyres().with_input(drive_mode, forces)
 
 
 def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> Assembly:

@@ -49,9 +49,9 @@ def repeated_pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndar
     return virtual.signals, virtual.samples(Faults(), 1)
 
 
-def sample_blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
+def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.ndarray]:
     """Samples (n, 60) of a recording of a length (s), one block after the other."""
-    signals, pattern = repeated_pattern(repeated)
+    signals, pattern = repeated_pattern(pattern_seconds)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
     length, count = len(pattern) - SEAM_SAMPLES, round(seconds / PERIOD) + 1
     fade = np.linspace(0.0, 1.0, SEAM_SAMPLES, endpoint=False)[:, None]
@@ -65,12 +65,12 @@ def sample_blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray
         yield values + normal_samples(SEED, 0, len(sample_numbers), 60, first) * deviation
 
 
-def long_recording(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
+def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) -> Recording:
     """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
     are missing."""
-    signals, _ = repeated_pattern(repeated)
+    signals, _ = repeated_pattern(pattern_seconds)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
-    for values in sample_blocks(seconds, repeated) if columns.done == 0 else ():
+    for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count
     return Recording(signals, columns, PERIOD)
@@ -89,13 +89,13 @@ def recorded_sections() -> Sections:
 def run_of(
     folder: Path,
     seconds: float,
-    repeated: float = 20.0,
+    pattern_seconds: float = 20.0,
     engine: str = "mujoco",
     hold: AttitudeHold | None = None,
     step: float | None = None,
 ) -> SectionRun:
     """A run of a recording in this folder; the recording is made if it is missing."""
-    recording = long_recording(seconds, folder / "recording.f64", repeated)
+    recording = long_recording(seconds, folder / "recording.f64", pattern_seconds)
     return SectionRun(r19(), recording, recorded_sections(), engine, hold or AttitudeHold(), step)
 
 
@@ -105,7 +105,7 @@ def answers_of(folder: Path, name: str = "run") -> bytes:
 
 
 def run_killed_process(
-    folder: Path, seconds: float, repeated: float, block: float, kill_count: int, lasting: float = 1.0
+    folder: Path, seconds: float, pattern_seconds: float, block: float, kill_count: int, lasting: float = 1.0
 ) -> int:
     """Run in a separate process, which is killed (signal 9) ``kill_count`` times at random moments and restarted until
     it ends; returns the number of starts.
@@ -117,7 +117,7 @@ def run_killed_process(
         sys.executable,
         "-m",
         "validation.measured.long_recording",
-        *map(str, (folder, seconds, repeated, block)),
+        *map(str, (folder, seconds, pattern_seconds, block)),
     ]
     while True:
         runs += 1
@@ -134,13 +134,13 @@ def run_killed_process(
                 raise RuntimeError(f"the run ended with {process.returncode}")
 
 
-def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
+def _main(folder: str, seconds: str, pattern_seconds: str, block: str, step: str = "") -> None:
     """Start or continue a run. Prints a line per block: seconds done, peak memory (bytes), processor time (s)."""
 
     def report_block(completed: float, total: float) -> None:
         print(completed, peak_memory(), time.process_time(), flush=True)
 
-    job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
+    job = run_of(Path(folder), float(seconds), float(pattern_seconds), step=float(step) if step else None)
     run(job, Path(folder) / "run", report_block, float(block))
 
 

@@ -54,9 +54,9 @@ def scaled_channels(
 
 
 @spoiling_function
-def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
+def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *hub_pairs: tuple[str, str]) -> None:
     """Fault: all channels of two hubs are exchanged."""
-    for pair in pairs:
+    for pair in hub_pairs:
         first, second = (
             column_numbers(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB_COMPONENTS)) for hub in pair
         )
@@ -64,16 +64,16 @@ def exchanged_hubs(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tup
 
 
 @spoiling_function
-def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """Fault: a channel is NaN for ``length`` (s) from ``begin`` (s) on."""
-    first = round(begin / virtual.period)
+def drop_samples(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin_time: float, length: float) -> None:
+    """Fault: a channel is NaN for ``length`` (s) from ``begin_time`` (s) on."""
+    first = round(begin_time / virtual.period)
     samples[first : first + round(length / virtual.period), column_numbers(virtual, name)] = np.nan
 
 
 @spoiling_function
-def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
-    """Fault: a channel keeps its value for ``length`` (s) from ``begin`` (s) on."""
-    first, (column,) = round(begin / virtual.period), column_numbers(virtual, name)
+def hold_sample(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin_time: float, length: float) -> None:
+    """Fault: a channel keeps its value for ``length`` (s) from ``begin_time`` (s) on."""
+    first, (column,) = round(begin_time / virtual.period), column_numbers(virtual, name)
     samples[first : first + round(length / virtual.period), column] = samples[first, column]
 
 
@@ -143,8 +143,10 @@ def _vehicle(name: str) -> CutVehicle:
     return cut(vehicles[name], "body")
 
 
-def _suspended_vehicle(vehicle: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
-    springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in vehicle.springs)
+def _suspended_vehicle(vehicle: SpatialVehicle, stiffer: float, damping_factor: float) -> SpatialVehicle:
+    springs = tuple(
+        replace(s, stiffness=stiffer * s.stiffness, damping=damping_factor * s.damping) for s in vehicle.springs
+    )
     return replace(vehicle, springs=springs)
 
 

@@ -24,14 +24,14 @@ PARAMETERS = 17
 
 def _compile_law(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
-    def law(model, data):
+    def law(model, case_data):
         header = carray(array_at(model, numeric), (PARAMETERS,))
-        row = int(np.rint(carray(double_at(data, time), (1,))[0] * header[0]))
+        row = int(np.rint(carray(double_at(case_data, time), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
         road = carray(array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
-        q, v = carray(array_at(data, position), (4,)), carray(array_at(data, velocity), (4,))
-        force = carray(array_at(data, passive), (4,))
+        q, v = carray(array_at(case_data, position), (4,)), carray(array_at(case_data, velocity), (4,))
+        force = carray(array_at(case_data, passive), (4,))
         road_index = PARAMETERS + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])

@@ -123,14 +123,14 @@ def _engine_colour(point: Point, measured_points: MeasuredPoints) -> str:
     return COLOURS[engine] if engine in COLOURS else FAMILY_COLOURS[other_engines.index(engine) % len(FAMILY_COLOURS)]
 
 
-def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], kind: str, style: Style) -> None:
+def _plot_curve(ax: Axes, measured_points: MeasuredPoints, points: list[Point], cost_kind: str, style: Style) -> None:
     """Plot one curve. Points below the accuracy of the reference are hollow, and points timed once are small."""
-    point_positions = [(p.cost(kind), measured_points.error(p)) for p in points]
+    point_positions = [(p.cost(cost_kind), measured_points.error(p)) for p in points]
     ax.plot(*zip(*point_positions, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     points_by_look = defaultdict(list)
     for p, point_position in zip(points, point_positions, strict=True):
         points_by_look[
-            point_position[1] < measured_points.judging_floor(), kind == "seconds" and p.changed is None
+            point_position[1] < measured_points.judging_floor(), cost_kind == "seconds" and p.changed is None
         ].append(point_position)
     for (hollow, once), points_alike in points_by_look.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (SINGLE_RUN_MARKER if once else 1.0)}
@@ -150,21 +150,21 @@ def _shade_floor(ax: Axes, measured_points: MeasuredPoints) -> None:
     ax.text(0.015, 0.012, floor_text, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL_TEXT, color=GREY)
 
 
-def _plot_front(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _plot_front(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
     """Plot the Pareto front, the settings that no other one beats, as a broad pale line behind the curves."""
-    front = measured_points.front(kind)
-    costs = [p.cost(kind) for p in front]
+    front = measured_points.front(cost_kind)
+    costs = [p.cost(cost_kind) for p in front]
     ax.plot(costs, list(map(measured_points.error, front)), **FRONT_STYLE, solid_capstyle="round", zorder=1)
 
 
-def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, kind: str) -> None:
+def _mark_defaults(ax: Axes, measured_points: MeasuredPoints, cost_kind: str) -> None:
     """Mark each engine's default setting with a ring, and write its name where the panel has most space."""
     taken_positions, names = _line_points(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured_points.defaults.items():
         if p.status != "ok":
             continue
-        default_position = (p.cost(kind), measured_points.error(p))
+        default_position = (p.cost(cost_kind), measured_points.error(p))
         ax.plot(*default_position, "o", **ring, zorder=5)
         around = _fractions_of_panel(ax, [default_position])[0]
         corner = _emptiest_corner(taken_positions, around, names)

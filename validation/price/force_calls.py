@@ -23,8 +23,8 @@ def _counted_loads() -> Iterator[list[int]]:
     calls = [0]
 
     class CountingClock(exudyn.SignalClock):
-        def reader(self, column: int, scale: float) -> Any:
-            read = super().reader(column, scale)
+        def reader(self, column: int, time_scale: float) -> Any:
+            read = super().reader(column, time_scale)
             if column:
                 return read
 

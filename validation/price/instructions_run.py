@@ -77,8 +77,8 @@ def mujoco_marches(masses: list[float], law: Callable[[Any, Any], list[float]], 
     )
     data = mujoco.MjData(model)
 
-    def passive(model: Any, data: Any) -> None:
-        data.qfrc_passive[:] = law(data.qpos.tolist(), data.qvel.tolist())
+    def passive(model: Any, case_data: Any) -> None:
+        case_data.qfrc_passive[:] = law(case_data.qpos.tolist(), case_data.qvel.tolist())
 
     def march(method: str, steps: int) -> None:
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{method.upper()}")

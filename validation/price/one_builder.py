@@ -140,11 +140,11 @@ def _spring_element(
     first_body: str,
     second_body: str,
     law: SpringDamper | Tyre,
-    start: Vector,
+    start_point: Vector,
     end_point: Vector,
     axis: Vector,
 ) -> Element:
-    vectors = (np.array(start, float), np.array(end_point, float), np.array(axis, float))
+    vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
     return Element(name, first_body, second_body, *vectors, law.stiffness, law.damping, 0.0, second_body)
 
 

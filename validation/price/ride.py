@@ -224,7 +224,7 @@ def judging_rows(ride: PricedRide, points: list[RoutePoint]) -> list[Row]:
     return rows
 
 
-def table(data: dict[str, Any]) -> Table:
+def table(case_data: dict[str, Any]) -> Table:
     """Table of all routes with errors, counts and times."""
     lines = tuple(
         (
@@ -233,7 +233,7 @@ def table(data: dict[str, Any]) -> Table:
             *(f"{p['errors'][kind]:.1e}" for kind in KINDS),
             f"{1e3 * p['seconds']:.3g}",
         )
-        for p in data["points"]
+        for p in case_data["points"]
     )
     note = (
         "Largest relative error of a standard deviation over all outputs of the kind. Part of a grid's error in "
@@ -243,17 +243,17 @@ def table(data: dict[str, Any]) -> Table:
     return Table(f"Standard deviations of R19-ride at {SPEED:g} m/s", note, ("route", "count", *KINDS, "ms"), lines)
 
 
-def draw(data: dict[str, Any]) -> tuple[str, Figure]:
+def draw(case_data: dict[str, Any]) -> tuple[str, Figure]:
     """Plot error over computing time (ms), with a panel per kind of output."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(1, len(KINDS), figsize=(COLUMN_WIDTH, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
     for ax, kind in zip(axes, KINDS, strict=True):
-        for p in data["points"]:
+        for p in case_data["points"]:
             x, y = 1e3 * p["seconds"], max(p["errors"][kind], np.finfo(float).eps)
             ax.plot(x, y, markers[p["unit"]], markersize=8, label=f"{p['name']}, {p['count']:,} {p['unit']}")
-        ax.axhspan(1e-30, data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
+        ax.axhspan(1e-30, case_data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
         ax.set(xscale="log", yscale="log", xlabel="time [ms] (median)", title=kind)
         ax.set_ylim(1e-16, 1.0)
     axes[0].set_ylabel("largest relative error\nof a standard deviation [-]")

@@ -165,23 +165,23 @@ def _loss_rows(measured_points: MeasuredPoints) -> list[Row]:
 
 
 def _rows_of_loss(
-    measured_points: MeasuredPoints, owner_of_default: str, engine: str, words: str, kind: str
+    measured_points: MeasuredPoints, owner_of_default: str, engine: str, loss_words: str, cost_kind: str
 ) -> list[Row]:
     target, unit, p = measured_points.middle, measured_points.unit, measured_points.defaults[owner_of_default]
-    lost = measured_points.loss(target, kind, p.setting.curve, engine)
+    lost = measured_points.loss(target, cost_kind, p.setting.curve, engine)
     if lost is None:
         return []
     extrapolation_text = ", extrapolated by its order" if lost.how == "extrapolated" else ""
     shared = [default.setting.engine for default in measured_points.defaults.values()].count(p.setting.engine) > 1
     whose = f"{p.setting.engine}.{owner_of_default}" if shared else p.setting.engine
-    name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{kind}".replace(" ", "-")
+    name = f"price.{measured_points.key}.default.{whose}.{'own' if engine else 'all'}.{cost_kind}".replace(" ", "-")
     interval_text = (
         f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     )
-    bounds = interval_text if kind == "seconds" else "exact"
+    bounds = interval_text if cost_kind == "seconds" else "exact"
     quantity = (
-        f"ratio of {kind}: {owner_of_default}'s default, {p.setting.method}, refined to {target:g} "
-        f"{unit}{extrapolation_text}, to {words}"
+        f"ratio of {cost_kind}: {owner_of_default}'s default, {p.setting.method}, refined to {target:g} "
+        f"{unit}{extrapolation_text}, to {loss_words}"
     )
     why = f"at its default {p.setting.label()} its error is {measured_points.error(p):.3g} {unit}"
     return [Observed(name, SYSTEM, quantity, lost.factor, "times").beside(bounds, why, "none")]

@@ -155,7 +155,7 @@ def bridge_share(timed_march: Saved) -> tuple[float, float, float]:
     return median(100.0 * (cheap - empty) / real)
 
 
-def rows(data: list[Saved]) -> list[Row]:
+def rows(case_data: list[Saved]) -> list[Row]:
     """Rows on the share of the bridge, without a verdict."""
     return [
         Observed(
@@ -165,7 +165,7 @@ def rows(data: list[Saved]) -> list[Row]:
             middle,
             "%",
         ).beside(f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated", "none")
-        for saved in data
+        for saved in case_data
         for middle, low, high in [bridge_share(saved)]
     ]
 
@@ -174,10 +174,10 @@ def _engine_text(timed_march: Saved) -> str:
     return f"{LABELS[timed_march['engine']]} {METHODS[timed_march['engine']]}"
 
 
-def table(data: list[Saved], problem: str) -> list[Table]:
+def table(case_data: list[Saved], problem: str) -> list[Table]:
     """Table of the parts of a step's time of a problem; none where the step was not split."""
     lines = []
-    for saved in data:
+    for saved in case_data:
         if saved["problem"] == problem:
             _, low, high = bridge_share(saved)
             values = (f"{value:.2f}" for value in step_parts(saved))

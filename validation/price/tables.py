@@ -202,11 +202,11 @@ def _mark_of_single_runs(points: list[Point], cheapest_reach: ToleranceCost | No
     )
 
 
-def _cost_text(cheapest_reach: ToleranceCost | None, scale: float, form: str) -> str:
+def _cost_text(cheapest_reach: ToleranceCost | None, unit_scale: float, form: str) -> str:
     return (
         "not met"
         if cheapest_reach is None
-        else format(scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
+        else format(unit_scale * cheapest_reach.cost, form) + _coarsest_text(cheapest_reach)
     )
 
 

@@ -126,30 +126,33 @@ Kind = tuple[str, dict[str, Any], dict[str, Any]]
 """Name, effects, and further tables of a scene."""
 
 
-def _iso_road(rng: Random, folder: Path, scene_number: int) -> Kind:
+def _iso_road(generator: Random, folder: Path, scene_number: int) -> Kind:
     road = {
         "source": "iso8608",
-        "road_class": str(rng.choice(list("ABCDE"))),
+        "road_class": str(generator.choice(list("ABCDE"))),
         "seed": scene_number,
-        "speed": float(round(rng.uniform(5.0, 35.0), 1)),
+        "speed": float(round(generator.uniform(5.0, 35.0), 1)),
     }
     return "rough road", {"road": road}, {}
 
 
-def _study_road(rng: Random, folder: Path, scene_number: int) -> Kind:
-    source = str(rng.choice(["study", "hills"]))
-    return f"{source} road", {"road": {"source": source, "speed": float(round(rng.uniform(5.0, 35.0), 1))}}, {}
+def _study_road(generator: Random, folder: Path, scene_number: int) -> Kind:
+    source = str(generator.choice(["study", "hills"]))
+    return f"{source} road", {"road": {"source": source, "speed": float(round(generator.uniform(5.0, 35.0), 1))}}, {}
 
 
-def _random_release(rng: Random, folder: Path, scene_number: int) -> Kind:
+def _random_release(generator: Random, folder: Path, scene_number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
-    drawn = {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()}
-    return "release", {}, {"start": drawn, "duration": float(rng.choice([0.2, 0.4, 2.5]))}
+    drawn = {key: float(size * generator.uniform(-1, 1)) for key, size in start.items()}
+    return "release", {}, {"start": drawn, "duration": float(generator.choice([0.2, 0.4, 2.5]))}
 
 
-def _forces(rng: Random, folder: Path, scene_number: int) -> Kind:
-    interpolation, period = str(rng.choice(["linear", "held", "smooth"])), float(rng.choice([1e-2, 5e-3, 2e-3]))
-    file = _write_wheel_forces(rng, folder, scene_number, period)
+def _forces(generator: Random, folder: Path, scene_number: int) -> Kind:
+    interpolation, period = (
+        str(generator.choice(["linear", "held", "smooth"])),
+        float(generator.choice([1e-2, 5e-3, 2e-3])),
+    )
+    file = _write_wheel_forces(generator, folder, scene_number, period)
     return (
         f"{interpolation} forces",
         {"wheel_forces": {"file": file, "interpolation": interpolation}},
@@ -157,10 +160,10 @@ def _forces(rng: Random, folder: Path, scene_number: int) -> Kind:
     )
 
 
-def _random_guided(rng: Random, folder: Path, scene_number: int) -> Kind:
-    file, pitch = _write_wheel_forces(rng, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
+def _random_guided(generator: Random, folder: Path, scene_number: int) -> Kind:
+    file, pitch = _write_wheel_forces(generator, folder, scene_number, 5e-3), f"pitch{scene_number}.csv"
     sample_times = 5e-3 * np.arange(101)
-    wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * sample_times))
+    wave = generator.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * generator.uniform(0.5, 3.0) * sample_times))
     write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
     effects = {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}}
     return "prescribed pitch", effects, {"duration": 0.2}
@@ -180,15 +183,15 @@ SCENE_KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
 )
 
 
-def _write_wheel_forces(rng: Random, folder: Path, scene_number: int, sample_period: float) -> str:
+def _write_wheel_forces(generator: Random, folder: Path, scene_number: int, sample_period: float) -> str:
     """Write a file of wheel forces: weight, two sine waves, and noise on each sample."""
     sample_times, name = sample_period * np.arange(round(0.5 / sample_period) + 1), f"forces{scene_number}.csv"
     forces = {
         wheel: (
             "N",
             3825.9
-            + 500 * np.sin(2 * np.pi * rng.uniform(1, 10) * sample_times + rng.uniform(0, 6))
-            + 200 * rng.standard_normal(len(sample_times)),
+            + 500 * np.sin(2 * np.pi * generator.uniform(1, 10) * sample_times + generator.uniform(0, 6))
+            + 200 * generator.standard_normal(len(sample_times)),
         )
         for wheel in ("front", "rear")
     }

@@ -23,7 +23,7 @@ from validation.replay.answers import (
 )
 
 
-def main(words: list[str]) -> int:
+def main(command_words: list[str]) -> int:
     """Record or check answers of all jobs. The exit code is 1 if a value, an exit code or a channel differs."""
     parser = argparse.ArgumentParser(prog="python -m validation.replay", description=__doc__)
     parser.add_argument("what", choices=("record", "check"))
@@ -34,7 +34,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--bound", type=float, default=0.0, help="allowed change, by a channel's largest number")
     parser.add_argument("--renamed", type=Path, help="TOML of earlier names of channels and later ones")
-    arguments = parser.parse_args(words)
+    arguments = parser.parse_args(command_words)
     if arguments.what == "record":
         return _record_answers(arguments)
     return _check_answers(arguments)

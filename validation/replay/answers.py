@@ -57,10 +57,10 @@ def answer_of_job(job: ReplayJob, command: str, folder: Path) -> CommandAnswer:
     return job_answer
 
 
-def _run_command(words: list[str], folder: Path, job_answer: CommandAnswer) -> None:
+def _run_command(command_words: list[str], folder: Path, job_answer: CommandAnswer) -> None:
     """Run one command, and add its exit code, message and printed tables to the answer."""
     start_time = time.monotonic()
-    code, printed_output, wrong = _run(words, folder)
+    code, printed_output, wrong = _run(command_words, folder)
     job_answer.seconds += time.monotonic() - start_time
     printed = _parsed_json(printed_output)
     if printed is not None:
@@ -73,11 +73,11 @@ def _run_command(words: list[str], folder: Path, job_answer: CommandAnswer) -> N
     job_answer.message += _masked_message(printed_output + wrong)
 
 
-def _run(words: list[str], folder: Path) -> tuple[int, str, str]:
+def _run(command_words: list[str], folder: Path) -> tuple[int, str, str]:
     surroundings = os.environ | {"COLUMNS": "200", "NO_COLOR": "1", "MPLBACKEND": "agg"}
     try:
         completed_process = subprocess.run(
-            words,
+            command_words,
             cwd=folder,
             env=surroundings,
             capture_output=True,
@@ -98,16 +98,16 @@ def _parsed_json(text: str) -> Any:
         return None
 
 
-def _values_with_places(value: Any, path_in_table: str = "") -> Iterator[tuple[str, float | str]]:
+def _values_with_places(nested_value: Any, path_in_table: str = "") -> Iterator[tuple[str, float | str]]:
     """Numbers and texts of a nested table, each with its place in the table."""
-    if isinstance(value, dict | list):
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+    if isinstance(nested_value, dict | list):
+        for key, inner in nested_value.items() if isinstance(nested_value, dict) else enumerate(nested_value):
             if key not in UNWATCHED_KEYS:
                 yield from _values_with_places(inner, f"{path_in_table}/{key}")
-    elif isinstance(value, bool | int | float):
-        yield path_in_table, float(value)
-    elif value is not None:
-        yield path_in_table, _masked_message(str(value))
+    elif isinstance(nested_value, bool | int | float):
+        yield path_in_table, float(nested_value)
+    elif nested_value is not None:
+        yield path_in_table, _masked_message(str(nested_value))
 
 
 def _masked_message(text: str) -> str:

@@ -33,10 +33,14 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 
 
 @cache
-def vehicle_and_road(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
-    """A shipped vehicle and a road of ``level`` times the paper's; a vehicle without a track width has one track."""
+def vehicle_and_road(
+    name: str, level_factor: float = 1.0, gravity: float = GRAVITY
+) -> tuple[SpatialVehicle, Excitation]:
+    """A shipped vehicle and a road of ``level_factor`` times the paper's; a vehicle without a track width has one
+    track.
+    """
     vehicle = replace(load_vehicle(name), gravity=gravity)
-    return vehicle, paper_road(wheels(vehicle), level=level * TRACK_DENSITY_LEVEL)
+    return vehicle, paper_road(wheels(vehicle), level_factor=level_factor * TRACK_DENSITY_LEVEL)
 
 
 def bent_in_engines(quick: bool) -> list[Row]:
@@ -154,13 +158,13 @@ def _spectral_densities(runs: dict[str, Ride], linear: LinearVehicle, excitation
     }
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Plot spectra of both engines' runs over the model's own."""
-    if not data["spectra"]:
+    if not case_data["spectra"]:
         return []
     from models.drawing.figures import COLOURS, COLUMN_WIDTH, DARK, LABELS, add_heading, legend_below, subplots
 
-    shown = data["spectra"]
+    shown = case_data["spectra"]
     units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 6.0), sharex=True)
     for axis, name, unit in zip(axes.ravel(), SHOWN_OUTPUTS, units, strict=True):

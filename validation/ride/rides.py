@@ -92,13 +92,16 @@ def one_track(axle_positions: tuple[float, ...], corner: float = 0.0) -> Excitat
 
 
 def paper_road(
-    wheels: Sequence[WheelPosition], *words: str, level: float = TRACK_DENSITY_LEVEL, cutoff: float | None = None
+    wheels: Sequence[WheelPosition],
+    *correlation_words: str,
+    level_factor: float = TRACK_DENSITY_LEVEL,
+    cutoff: float | None = None,
 ) -> Excitation:
     """The paper's road under wheels, with a case of correlation in words; wheels without a track width have one
     track."""
     y = half_track(wheels)
     placed = wheels if y else on_track(wheels, 1.0)
-    return road_excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
+    return road_excitation(road_of_level(y or 1.0, level_factor, cutoff=cutoff), placed, *correlation_words)
 
 
 def five_cases(wheels: Sequence[WheelPosition], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
@@ -150,8 +153,8 @@ def changed_vehicle(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
     """The vehicle with its masses, stiffnesses and dampings changed by up to LARGEST_CHANGE each, named a twin."""
     rng = np.random.default_rng(seed)
 
-    def changed(value: float) -> float:
-        return value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
+    def changed(parameter_value: float) -> float:
+        return parameter_value * (1 + LARGEST_CHANGE * rng.uniform(-1, 1))
 
     bodies = []
     for body in vehicle.bodies:

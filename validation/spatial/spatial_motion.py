@@ -57,9 +57,9 @@ def path(sample_count: int = 2001, sample_period: float = 1e-3) -> Path:
     return Path(alpha, rates, orientation, accelerations, positions, StartState(*rows), sample_period)
 
 
-def _sine_waves(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sine_waves(t: np.ndarray, wave_shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sine waves (n, 3) and their first two derivatives; shapes: rows of amplitude, angular frequency and phase."""
-    size, speed, phase = shapes.T
+    size, speed, phase = wave_shapes.T
     angle = np.outer(t, speed) + phase
     return size * np.sin(angle), size * speed * np.cos(angle), -size * speed**2 * np.sin(angle)
 
@@ -75,11 +75,11 @@ def sensor_readings(sensor_positions: np.ndarray, motion: Path = PATH) -> np.nda
     return felt[:, None] + np.einsum("nij,sj->nsi", lever, np.asarray(sensor_positions))
 
 
-def tilted_sensors(height: float, turn: np.ndarray) -> Places:
+def tilted_sensors(height: float, rotation: np.ndarray) -> Places:
     """Positions of five sensors, rotated and shifted: four at the corners of a floor of 2 m by 1.2 m, and one above its
     middle."""
     floor = np.array([[1, 0.6, 0], [1, -0.6, 0], [-1, 0.6, 0], [-1, -0.6, 0], [0, 0, -height]])
-    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ turn.T)}
+    return {f"s{i + 1}": (float(x), float(y), float(z)) for i, (x, y, z) in enumerate(floor @ rotation.T)}
 
 
 TURN = rotation_matrix(from_cardan(0.3, 0.4, 0.5))

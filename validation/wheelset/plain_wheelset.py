@@ -61,19 +61,19 @@ def axle_of(state: np.ndarray, speed: float) -> PlainAxle:
     return PlainAxle(np.array([0.0, y, z]), np.array([speed, y_rate, z_rate]), axle, forward, turning)
 
 
-def contact_of_wheel(wheelset: Wheelset, side: float, axle: PlainAxle) -> Touch:
-    """Contact of a conical wheel with its rail; side : 1 right, -1 left.
+def contact_of_wheel(wheelset: Wheelset, wheel_side: float, axle: PlainAxle) -> Touch:
+    """Contact of a conical wheel with its rail; wheel_side : 1 right, -1 left.
 
     The tangent plane's normal n, square to x, is inclined to the axle by the cone's half angle: n . axle = side sin.
     The generator of that plane runs from the apex; the place is where it crosses the head's axis as seen along n.
     """
     w, (sine, cosine) = wheelset, wheelset.slant
-    outward = side * axle.axle
+    outward = wheel_side * axle.axle
     size, phase = np.hypot(outward[1], outward[2]), np.arctan2(outward[1], outward[2])
     angle = phase - np.arccos(sine / size) if outward[1] > 0.0 else phase + np.arccos(sine / size)
     normal = np.array([0.0, np.sin(angle), np.cos(angle)])
     apex = axle.centre + (w.half_gauge + w.radius / w.conicity) * outward
-    middle = np.array([0.0, side * (w.half_gauge + w.head_radius * sine), w.radius + w.head_radius * cosine])
+    middle = np.array([0.0, wheel_side * (w.half_gauge + w.head_radius * sine), w.radius + w.head_radius * cosine])
     radial = (normal - sine * outward) / cosine
     inward = -cosine * outward + sine * radial
     across_normal = np.cross(np.array([1.0, 0.0, 0.0]), normal)
@@ -119,9 +119,9 @@ def creep_forces(
     return np.array([float(creep.fx), float(creep.fy), float(creep.mz)])
 
 
-def patch_forces(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
+def patch_forces(wheelset: Wheelset, wheel_side: float, axle: PlainAxle, law: str, cells: int) -> PatchForces:
     """Force and moment of one rail on the wheelset."""
-    w, speed, touch = wheelset, axle.velocity[0], contact_of_wheel(wheelset, side, axle)
+    w, speed, touch = wheelset, axle.velocity[0], contact_of_wheel(wheelset, wheel_side, axle)
     across = np.cross(touch.normal, np.array([1.0, 0.0, 0.0]))
     velocity = axle.velocity + np.cross(axle.turning, touch.place)
     slip, approach = np.array([velocity[0], velocity @ across, axle.turning @ touch.normal]), velocity @ touch.normal
@@ -136,8 +136,8 @@ def patch_forces(wheelset: Wheelset, side: float, axle: PlainAxle, law: str, cel
         creep += forwards * creep_forces(w, (load, a, b), slip / reference_speed, law, cells)
     if forwards < 1.0:
         creep += (1.0 - forwards) * mirror * creep_forces(w, (load, a, b), mirror * slip / reference_speed, law, cells)
-    beyond = max(0.0, side * axle.centre[1] - w.flange_clearance)
-    push = np.array([0.0, -side * w.flange_stiffness * beyond, 0.0])
+    beyond = max(0.0, wheel_side * axle.centre[1] - w.flange_clearance)
+    push = np.array([0.0, -wheel_side * w.flange_stiffness * beyond, 0.0])
     force = np.array([creep[0], 0.0, 0.0]) + creep[1] * across - load * touch.normal + push
     report = {"load": load, "fx": creep[0], "fy": creep[1], "mz": creep[2], "a": a, "b": b, "depth": touch.depth}
     report |= {

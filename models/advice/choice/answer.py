@@ -135,11 +135,13 @@ def sum_of_differences(*changes: Cases) -> Cases:
     return tuple(np.sum(_at_common_times(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
-def largest_relative_change(differences: Cases, size: np.ndarray) -> float:
+def largest_relative_change(differences: Cases, full_size: np.ndarray) -> float:
     """Largest relative change among the cases: the rms difference of a path, or the difference of a number, divided by
     its size.
     """
     largest_differences = np.array([float(np.sqrt(np.mean(difference**2))) for difference in differences])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(size > 0.0, largest_differences / size, np.where(largest_differences > 0.0, np.inf, 0.0))
+        share = np.where(
+            full_size > 0.0, largest_differences / full_size, np.where(largest_differences > 0.0, np.inf, 0.0)
+        )
     return float(share.max()) if np.isfinite(largest_differences).all() else np.inf

@@ -337,9 +337,9 @@ class Chooser:
                 shares[effect] = self.share(further) * self.tolerance
         return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
-    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow."""
-        path = list(start)
+    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
+        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow."""
+        path = list(first_sets)
         while True:
             step = self._best_step(path[-1], banned, [frozenset([effect]) for effect in self.effects])
             step = step or self._best_step(path[-1], banned, self._promising_pairs())
@@ -360,14 +360,14 @@ class Chooser:
             self._pairs = self._pairs_within_budget([frozenset(pair) for pair in pairs])
         return self._pairs
 
-    def _pairs_within_budget(self, pairs: list[EffectSet]) -> list[EffectSet]:
+    def _pairs_within_budget(self, effect_pairs: list[EffectSet]) -> list[EffectSet]:
         """Pairs of effects that keep to the error budget, as far as the budget of calls lets them be tested."""
         within = list[EffectSet]()
-        for i, pair in enumerate(pairs):
+        for i, pair in enumerate(effect_pairs):
             if self._budget_spent():
                 break
             if i % PAIRS_IN_ADVANCE == 0:
-                self.screen.ahead(pairs[i : i + PAIRS_IN_ADVANCE])
+                self.screen.ahead(effect_pairs[i : i + PAIRS_IN_ADVANCE])
             within += [pair] if self.share(pair) <= PREDICTION_SHARE else []
         return within
 

@@ -42,8 +42,8 @@ def _absent_effect_lines(prices: PriceList, quantities: list[str]) -> list[str]:
     return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
-def _microseconds_text(spread: tuple[float, float]) -> str:
-    return f"{_number_text(spread[0], 3)} +- {_number_text(spread[1], 1)} us"
+def _microseconds_text(median_and_deviation: tuple[float, float]) -> str:
+    return f"{_number_text(median_and_deviation[0], 3)} +- {_number_text(median_and_deviation[1], 1)} us"
 
 
 def _number_text(value: float, digits: int) -> str:
@@ -106,11 +106,11 @@ def as_dict(prices: PriceList) -> dict[str, Any]:
     return plain
 
 
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_value(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(inner) for inner in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
+def _json_value(table_value: Any) -> Any:
+    if isinstance(table_value, dict):
+        return {key: _json_value(inner) for key, inner in table_value.items()}
+    if isinstance(table_value, list | tuple):
+        return [_json_value(inner) for inner in table_value]
+    if isinstance(table_value, float | np.floating):
+        return float(table_value) if np.isfinite(table_value) else None
+    return table_value

@@ -26,9 +26,9 @@ OTHER_TOLERANCE = 1e-8
 """Relative tolerance of the second solver, which has its own steps."""
 
 
-def first_part(duration: float, longest: float) -> float:
-    """Duration (s) of the first part of a run: at most ``longest``, and a whole fraction of the run."""
-    return duration / math.ceil(duration / longest * (1 - 1e-9))
+def first_part(duration: float, longest_part: float) -> float:
+    """Duration (s) of the first part of a run: at most ``longest_part``, and a whole fraction of the run."""
+    return duration / math.ceil(duration / longest_part * (1 - 1e-9))
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,12 @@ def checked_quantity(quantity: str, known_names: dict[str, Any]) -> str:
     return quantity
 
 
-def run_and_quantity(quantity: str | None, default_quantity: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
+def run_and_quantity(
+    quantity: str | None, default_quantity: str, runs: dict[str, Any], run_kind: str
+) -> tuple[str, str]:
     """Names of the run and of the quantity, which a user gives as RUN.QUANTITY; the first run where none is named."""
     name, _, quantity_name = (quantity or default_quantity).rpartition(".")
     name = name or next(iter(runs))
     if name not in runs:
-        raise InputError("--quantity", "", quantity, f"names no {kind} of this scene", tuple(runs))
+        raise InputError("--quantity", "", quantity, f"names no {run_kind} of this scene", tuple(runs))
     return name, quantity_name

@@ -222,21 +222,23 @@ def _seconds_by_round(search: Search, rivals: list[TriedSetting], round_count: i
     return dict(zip((attempt.setting for attempt in rivals), seconds_by_setting, strict=True))
 
 
-def _cheapest_by_key(timed: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
+def _cheapest_by_key(timed_choices: list[SettingChoice], keys: Iterable[tuple[str, str]]) -> Winners:
     """The cheapest setting for every pair of engine and cost in ``keys`` that has any."""
-    return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
+    return {key: best for key in keys if (best := _cheapest(timed_choices, *key)) is not None}
 
 
-def _cheapest(timed: list[SettingChoice], engine: str, kind: str) -> SettingChoice | None:
+def _cheapest(timed_choices: list[SettingChoice], engine: str, cost_kind: str) -> SettingChoice | None:
     """The setting of an engine with the least cost. By seconds, which scatter, a default method is preferred unless it
     is clearly slower.
     """
-    able = [choice for choice in timed if choice.tried.setting.engine.startswith(engine)]
+    able = [choice for choice in timed_choices if choice.tried.setting.engine.startswith(engine)]
     if not able:
         return None
-    best = min(able, key=lambda choice: getattr(choice, kind))
+    best = min(able, key=lambda choice: getattr(choice, cost_kind))
     usual = [
-        choice for choice in able if choice.tried.setting.default and kind == "seconds" and not _is_slower(choice, best)
+        choice
+        for choice in able
+        if choice.tried.setting.default and cost_kind == "seconds" and not _is_slower(choice, best)
     ]
     return min(usual, key=lambda choice: choice.seconds) if usual else best
 
@@ -253,7 +255,7 @@ TruthAndOutcomes = tuple[ReferenceTruth, list[SettingChoice], Winners]
 
 
 def _confirmed_over_whole_run(
-    search: Search, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+    search: Search, timed_choices: list[SettingChoice], winners: Winners, executor: Executor | None
 ) -> TruthAndOutcomes:
     """The winners and defaults after runs over the whole scene, refined until they meet the tolerance there; with the
     truth.
@@ -262,7 +264,7 @@ def _confirmed_over_whole_run(
     rung = max(0, search.truth.rung - 1)
     known = reference_truth(scene, search.tolerance, scene.whole, rung, second_method=False, executor=executor)
     ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
-    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed, winners)}
+    able = {choice.tried.setting: choice for choice in _winners_and_defaults(timed_choices, winners)}
     full_search = Search(scene, known, search.tolerance, scene.whole)
     blocks = [(ladders[setting.curve], choice) for setting, choice in able.items()]
     confirmed = block_results(partial(_valid_over_run, full_search), blocks, executor)
@@ -271,9 +273,11 @@ def _confirmed_over_whole_run(
     return known, confirmed_choices, _cheapest_by_key(confirmed_choices, winners)
 
 
-def _winners_and_defaults(timed: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
+def _winners_and_defaults(timed_choices: list[SettingChoice], winners: Winners) -> list[SettingChoice]:
     """The winners and the settings of default methods, each once."""
-    return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
+    return list(
+        dict.fromkeys([*winners.values(), *(choice for choice in timed_choices if choice.tried.setting.default)])
+    )
 
 
 @dataclass(frozen=True)
@@ -312,12 +316,16 @@ def _valid_over_run(search: Search, block: tuple[SettingLadder, SettingChoice]) 
 
 
 def _with_finer_truth(
-    scene: PricedScene, truth: ReferenceTruth, timed: list[SettingChoice], winners: Winners, executor: Executor | None
+    scene: PricedScene,
+    truth: ReferenceTruth,
+    timed_choices: list[SettingChoice],
+    winners: Winners,
+    executor: Executor | None,
 ) -> TruthAndOutcomes:
     """A truth that is more exact than the winners and the defaults, and these with their errors from it: a setting may
     be far better than its tolerance asks, and as good as the reference that it was compared with.
     """
-    shown = _winners_and_defaults(timed, winners)
+    shown = _winners_and_defaults(timed_choices, winners)
     errors = {choice.tried.setting: choice.error for choice in shown}
     if _is_blurred(truth, errors):
         answers = dict(zip(errors, block_results(partial(_whole_answer, scene), errors, executor), strict=True))
@@ -328,7 +336,7 @@ def _with_finer_truth(
     }
     return (
         truth,
-        [choices_with_errors.get(choice.tried.setting, choice) for choice in timed],
+        [choices_with_errors.get(choice.tried.setting, choice) for choice in timed_choices],
         {key: choices_with_errors[choice.tried.setting] for key, choice in winners.items()},
     )
 
@@ -364,14 +372,14 @@ def _finer_truth(
     return truth, errors
 
 
-def _default_cost(search: Search, ladder: SettingLadder, timed: list[SettingChoice]) -> Default | None:
+def _default_cost(search: Search, ladder: SettingLadder, timed_choices: list[SettingChoice]) -> Default | None:
     """Error and cost of an engine's default settings, and the cost at which they meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
     tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
     if not tried:
         return None
     as_it_is = min(tried, key=lambda attempt: abs(np.log(attempt.setting.value / ladder.default)))
-    met = next((attempt for attempt in timed if attempt.tried.setting.curve == curve), None)
+    met = next((attempt for attempt in timed_choices if attempt.tried.setting.curve == curve), None)
     clear = [attempt for attempt in tried if attempt.status == "ok"]
     if met is not None or not clear:
         return Default(as_it_is, met, False)

@@ -67,9 +67,9 @@ class Point:
     changed: bool | None = None
     broken: tuple[str, ...] = ()
 
-    def cost(self, kind: str) -> float:
+    def cost(self, cost_kind: str) -> float:
         """Cost of this kind: a count, or the median of the seconds."""
-        return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts[kind])
+        return float(np.median(self.seconds)) if cost_kind == "seconds" else float(self.counts[cost_kind])
 
 
 @dataclass(frozen=True)
@@ -144,12 +144,12 @@ class MeasuredPoints:
                 points_of[p.setting.curve].append(p)
         return points_of
 
-    def front(self, kind: str) -> list[Point]:
+    def front(self, cost_kind: str) -> list[Point]:
         """Points that no other point beats in both cost and error, in the order of rising cost, without errors below
         ``judging_floor``.
         """
         clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.judging_floor()]
-        return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
+        return [clear[i] for i in pareto([p.cost(cost_kind) for p in clear], list(map(self.error, clear)))]
 
     def observed_orders(self, quantity: str) -> dict[str, float]:
         """Observed order of convergence of each curve: in the step, or in 1 / force calls for adaptive methods."""
@@ -188,40 +188,40 @@ class MeasuredPoints:
         return {curve: cheapest for curve, cheapest in reaches.items() if cheapest is not None}
 
     def _cost_at_tolerance(
-        self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
+        self, points: list[Point], target_error: float, costs: Sequence[float], extrapolate: bool = True
     ) -> ToleranceCost | None:
         """Cost at which the points of one curve meet a target, by ``curves.reach``."""
         order = 0 if points[0].setting.adaptive else points[0].setting.order
         values = [p.setting.value for p in points]
-        return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)
+        return reach(values, list(map(self.error, points)), costs, target_error, order, extrapolate)
 
-    def loss(self, target: float, kind: str, default: str, engine: str = "") -> Loss | None:
+    def loss(self, target_error: float, cost_kind: str, default: str, engine: str = "") -> Loss | None:
         """Loss of the curve ``default`` compared with the cheapest curve of ``engine`` ("" for all engines); None if no
         curve meets the target.
         """
-        best = cheapest_curve(self.reaches(target, kind), engine)
-        usual = self.reaches(target, kind, extrapolate=True).get(default)
+        best = cheapest_curve(self.reaches(target_error, cost_kind), engine)
+        usual = self.reaches(target_error, cost_kind, extrapolate=True).get(default)
         if best is None or usual is None:
             return None
         factor = low = high = usual.cost / best[1].cost
-        if kind == "seconds" and best[0] != default:
+        if cost_kind == "seconds" and best[0] != default:
             pair = [bracketing_points(self.curves()[curve], cheapest) for curve, cheapest in ((default, usual), best)]
             rounds = min(len(p.seconds) for side in pair for p in side)
             if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
-            sides = [self._bootstrapped_seconds(side, target, rounds) for side in pair]
+            sides = [self._bootstrapped_seconds(side, target_error, rounds) for side in pair]
             factor, low, high = interval(sides[0] / sides[1])
         return Loss(factor, low, high, usual.how)
 
-    def _bootstrapped_seconds(self, side: list[Point], target: float, round_count: int) -> np.ndarray:
+    def _bootstrapped_seconds(self, bracketing: list[Point], target_error: float, round_count: int) -> np.ndarray:
         """Seconds that a curve needs to meet a target, from the points that its interpolation uses, one value per
         bootstrap sample of the rounds that both have.
         """
-        timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in side]
+        timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracketing]
         medians = np.array(
             [np.median(seconds[resamples(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
         )
-        cheapest_reaches = [self._cost_at_tolerance(side, target, costs) for costs in medians.T]
+        cheapest_reaches = [self._cost_at_tolerance(bracketing, target_error, costs) for costs in medians.T]
         return np.array([cheapest.cost for cheapest in cheapest_reaches if cheapest is not None])
 
     def points_to_time(self) -> list[Point]:

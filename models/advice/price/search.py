@@ -191,7 +191,7 @@ def _next_rung(ladder: SettingLadder, low: int, high: int, last_tried: TriedSett
     return _rung_for_target(ladder, wanted, low, high)
 
 
-def _rung_for_target(ladder: SettingLadder, target: float, low: int, high: int) -> int:
-    """The coarsest of the remaining rungs that is no coarser than ``target``."""
-    i = bisect_left(ladder.values, -target * (1 + 1e-9), key=lambda value: -value)
+def _rung_for_target(ladder: SettingLadder, target_value: float, low: int, high: int) -> int:
+    """The coarsest of the remaining rungs that is no coarser than ``target_value``."""
+    i = bisect_left(ladder.values, -target_value * (1 + 1e-9), key=lambda value: -value)
     return min(max(i, low), high - 1)

@@ -237,12 +237,12 @@ class Chooser(Candidates):
         }
         return {effect: change for effect, change in changes.items() if change < inf}
 
-    def path(self, start: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
-        """Path of sets of effects that extends ``start``, one step at a time, as far as predictions allow.
+    def path(self, first_sets: list[EffectSet], banned: set[EffectSet]) -> list[EffectSet]:
+        """Path of sets of effects that extends ``first_sets``, one step at a time, as far as predictions allow.
 
         A step saves calls, or where none does, work; there is none where none is within the tolerance.
         """
-        path = list(start)
+        path = list(first_sets)
         while step := self._best_step(path[-1], banned, self._calls_saved) or self._best_step(
             path[-1], banned, self._work_saved
         ):

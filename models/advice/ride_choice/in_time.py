@@ -200,9 +200,9 @@ def _can_be_left_out(scene: ReducedScene, effect: Effect) -> bool:
     )
 
 
-def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of a reduced scene; ``moving`` : motion of the nonlinear springs, for the gains that replace their
-    laws.
+def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]) -> SpatialVehicle:
+    """The vehicle of a reduced scene; ``motion_of_spring`` : motion of the nonlinear springs, for the gains that
+    replace their laws.
     """
     springs = scene.vehicle.springs
     seats = {s.first_body: s.second_body for s in springs if s.name in scene.rigid and s.second_body is not None}
@@ -216,14 +216,18 @@ def reduced_vehicle(scene: ReducedScene, moving: dict[str, BentSpring]) -> Spati
 
     return replace(
         scene.vehicle,
-        springs=tuple(_linearised_spring(s, scene.straight, moving) for s in springs if s.name not in scene.rigid),
+        springs=tuple(
+            _linearised_spring(s, scene.straight, motion_of_spring) for s in springs if s.name not in scene.rigid
+        ),
         bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda any_body: any_body.name in seats)),
     )
 
 
-def _linearised_spring(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
+def _linearised_spring(
+    spring: SpringDamper, laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
+) -> SpringDamper:
     """The spring with gains of statistical linearisation in place of these laws."""
-    motion = moving.get(spring.name)
+    motion = motion_of_spring.get(spring.name)
     if motion is None:
         return spring
     if "travel_force" in laws and spring.travel_force:

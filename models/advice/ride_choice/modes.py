@@ -124,8 +124,8 @@ def behind_weightings(A: np.ndarray, system: Modes | None, names: tuple[str, ...
 
 
 @lru_cache(maxsize=256)
-def _modes_of_filters(F: bytes, size: int, axles: int) -> Modes | None:
-    modes_of_filter = modes_of(np.frombuffer(F).reshape(size, size))
+def _modes_of_filters(F: bytes, filter_size: int, axles: int) -> Modes | None:
+    modes_of_filter = modes_of(np.frombuffer(F).reshape(filter_size, filter_size))
     if modes_of_filter is None:
         return None
     return Modes(

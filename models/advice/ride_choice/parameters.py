@@ -49,5 +49,9 @@ def scaled_vehicle(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) 
     return replace(vehicle, **groups)
 
 
-def _multiplied(value: Any, factor: float) -> Any:
-    return tuple(_multiplied(component, factor) for component in value) if isinstance(value, tuple) else value * factor
+def _multiplied(parameter_value: Any, factor: float) -> Any:
+    return (
+        tuple(_multiplied(component, factor) for component in parameter_value)
+        if isinstance(parameter_value, tuple)
+        else parameter_value * factor
+    )

@@ -91,13 +91,13 @@ class Numbers:
         self._of_object: dict[int, tuple[object, int]] = {}
         self._of_value: dict[Hashable, int] = {}
 
-    def of(self, known_object: object, value: Callable[[], Hashable]) -> int:
+    def of(self, known_object: object, value_of: Callable[[], Hashable]) -> int:
         """Number of an object's value. The object is kept, so that its identity remains unique."""
         known = self._of_object.get(id(known_object))
         if known is None:
             known = self._of_object[id(known_object)] = (
                 known_object,
-                self._of_value.setdefault(value(), len(self._of_value)),
+                self._of_value.setdefault(value_of(), len(self._of_value)),
             )
         return known[1]
 
@@ -107,8 +107,8 @@ class Numbers:
         return tuple(self.of(attribute, partial(_hashable_key, attribute)) for attribute in parts)
 
 
-def _hashable_key(value: Hashable) -> Hashable:
-    return value
+def _hashable_key(any_value: Hashable) -> Hashable:
+    return any_value
 
 
 PARTS_OF_VEHICLE = tuple(field.name for field in fields(SpatialVehicle))

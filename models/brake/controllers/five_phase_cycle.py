@@ -130,30 +130,40 @@ def time_to_corner(state, rate, brakes):
 
 
 @njit(cache=True, error_model="numpy")
-def phase_end(state, sign, level, other_level, wheel_at_speed):
-    """MET if the rim's acceleration has passed ``level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at most
-    ``other_level`` (m/s^2), else -1."""
+def phase_end(state, sign, end_level, other_level, wheel_at_speed):
+    """MET if the rim's acceleration has passed ``end_level`` in the direction ``sign``, OTHER_LEVEL_MET if it is at
+    most ``other_level`` (m/s^2), else -1.
+    """
     acceleration = rim_acceleration(state, wheel_at_speed)
-    return LEVEL_MET if sign * (acceleration - level) >= 0.0 else OTHER_LEVEL_MET if acceleration <= other_level else -1
+    return (
+        LEVEL_MET
+        if sign * (acceleration - end_level) >= 0.0
+        else OTHER_LEVEL_MET
+        if acceleration <= other_level
+        else -1
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def integrate_phase(state, rate, sign, level, other_level, step, wheel_at_speed):
+def integrate_phase(state, rate, sign, end_level, other_level, step, wheel_at_speed):
     """Integrate one phase from ``state`` at a constant rate of pressure (bar/s) in steps (s): the last state, and how
     the phase ended.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
-    began, end = state.time, phase_end(state, sign, level, other_level, wheel_at_speed)
+    began, end = state.time, phase_end(state, sign, end_level, other_level, wheel_at_speed)
     while end < 0:
         time = min(step, time_to_corner(state, rate, wheel_at_speed.brakes))
         next_state = go_on(state, rate, time, wheel_at_speed)
-        end = phase_end(next_state, sign, level, other_level, wheel_at_speed)
+        end = phase_end(next_state, sign, end_level, other_level, wheel_at_speed)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
-                if phase_end(go_on(state, rate, middle, wheel_at_speed), sign, level, other_level, wheel_at_speed) >= 0:
+                if (
+                    phase_end(go_on(state, rate, middle, wheel_at_speed), sign, end_level, other_level, wheel_at_speed)
+                    >= 0
+                ):
                     high = middle
                 else:
                     low = middle
@@ -177,7 +187,9 @@ class Cycle:
     slips: tuple[float, ...]
 
 
-def limit_cycle(frozen: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most_cycles: int = 60) -> Cycle:
+def limit_cycle(
+    wheel_at_speed: WheelAtSpeed, controller: FivePhase, step: float = 2e-5, most_cycles: int = 60
+) -> Cycle:
     """Limit cycle of the continuous controller, reached from a wheel that rolls freely, in steps of at most ``step``
     (s).
 
@@ -187,37 +199,39 @@ def limit_cycle(frozen: WheelAtSpeed, controller: FivePhase, step: float = 2e-5,
     Raises RunFailed if a phase does not end, a wheel locks while it is not released, or no cycle closes among
     ``most_cycles``.
     """
-    state, _ = _state_at_end(frozen.rolling(), 0, controller, step, frozen)
+    state, _ = _state_at_end(wheel_at_speed.rolling(), 0, controller, step, wheel_at_speed)
     for _ in range(most_cycles):
         state = state._replace(time=0.0, impulse=0.0)
         path, number = [state], RELEASE_PHASE
         while number <= SLOW_PHASE:
-            state, end = _state_at_end(state, number, controller, step, frozen)
+            state, end = _state_at_end(state, number, controller, step, wheel_at_speed)
             path.append(state)
             number = SLOW_PHASE if end == OTHER_LEVEL_MET else number + 1
         first = path[0]
         if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED_CYCLE_TOLERANCE:
-            return _cycle_from_switches(path, frozen)
+            return _cycle_from_switches(path, wheel_at_speed)
     raise RunFailed("braking", f"{most_cycles} cycles of the five phases do not close")
 
 
-def _cycle_from_switches(switch_states: list[WheelState], frozen: WheelAtSpeed) -> Cycle:
+def _cycle_from_switches(switch_states: list[WheelState], wheel_at_speed: WheelAtSpeed) -> Cycle:
     """The ``Cycle`` computed from the wheel's states at the six switches between phases."""
     last_state, slips = (
         switch_states[-1],
-        [1.0 - frozen.radius * state.turning / frozen.speed for state in switch_states],
+        [1.0 - wheel_at_speed.radius * state.turning / wheel_at_speed.speed for state in switch_states],
     )
     durations = tuple(np.diff([state.time for state in switch_states]).tolist())
-    return Cycle(last_state.time, durations, last_state.impulse / last_state.time / frozen.peak, tuple(slips))
+    return Cycle(last_state.time, durations, last_state.impulse / last_state.time / wheel_at_speed.peak, tuple(slips))
 
 
 def _state_at_end(
-    state: WheelState, phase_number: int, controller: FivePhase, step: float, frozen: WheelAtSpeed
+    state: WheelState, phase_number: int, controller: FivePhase, step: float, wheel_at_speed: WheelAtSpeed
 ) -> tuple[WheelState, int]:
     """State at the end of a phase, and whether it ended as LEVEL_MET or as OTHER_LEVEL_MET; raises RunFailed."""
     sign, level = end_of_phase(phase_number, controller)
     back = controller.e4 if phase_number == SPEED_UP_PHASE else -math.inf
-    state, end = integrate_phase(state, rate_of_phase(phase_number, controller), sign, level, back, step, frozen.driven)
+    state, end = integrate_phase(
+        state, rate_of_phase(phase_number, controller), sign, level, back, step, wheel_at_speed.driven
+    )
     if end == NEVER_ENDS or (end == WHEEL_LOCKS and phase_number != 0):
         failure = (
             f"the wheel locks in phase {phase_number}" if end == WHEEL_LOCKS else f"phase {phase_number} does not end"
@@ -227,18 +241,18 @@ def _state_at_end(
 
 
 def sampled_cycle(
-    frozen: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
+    wheel_at_speed: WheelAtSpeed, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5
 ) -> Cycle:
     """Mean over ``cycles`` cycles of the sampled controller, after the first ``skip`` ones; no durations and slips are
     given.
 
     Raises RunFailed if it does not cycle.
     """
-    state, driven, number, falling = frozen.rolling(), frozen.driven, 0, False
+    state, driven, number, falling = wheel_at_speed.rolling(), wheel_at_speed.driven, 0, False
     starts: list[WheelState] = []
     while len(starts) <= cycles + skip:
-        wheels = np.array([frozen.radius * state.turning])
-        sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
+        wheels = np.array([wheel_at_speed.radius * state.turning])
+        sample = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, wheel_at_speed.speed)
         pressure = float(np.asarray(controller.sample(sample).pressures)[0])
         if pressure < state.pressure and not falling:
             starts.append(state)
@@ -250,4 +264,4 @@ def sampled_cycle(
             raise RunFailed("braking", "the sampled controller does not cycle", state.time)
     first_start, last_start = starts[skip], starts[-1]
     time, impulse = last_start.time - first_start.time, last_start.impulse - first_start.impulse
-    return Cycle(time / cycles, (), impulse / time / frozen.peak, ())
+    return Cycle(time / cycles, (), impulse / time / wheel_at_speed.peak, ())

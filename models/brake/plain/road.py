@@ -15,7 +15,7 @@ def under_wheels(road: Road, wheel_paths: np.ndarray, surface_kinds: np.ndarray)
     ]
 
 
-def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
+def _surface_under(road: Road, distance: np.ndarray, surface_kind: int) -> Surface:
     (behind, front_end), (right, left) = np.sort(distance[:, 0]), np.sort(distance[:, 1])
     first_stretch, last_stretch = _stretch_at(road, behind), _stretch_at(road, front_end)
     if last_stretch > first_stretch:
@@ -29,7 +29,7 @@ def _surface_under(road: Road, distance: np.ndarray, kind: int) -> Surface:
         )
     else:
         sides, share = 2 * [int((road.left if right >= road.line else road.right)[first_stretch])], 0.0
-    near, far = (side * road.kinds + kind for side in sides)
+    near, far = (side * road.kinds + surface_kind for side in sides)
     return Surface(near, far, float(share) if near != far else 0.0)
 
 

@@ -16,9 +16,9 @@ LOCKING_SLIP = 0.98
 """Slip from which on the force turns to that of a locked tyre, against the way in which it slides."""
 
 
-def interpolation_weights(nodes: np.ndarray, value: float) -> np.ndarray:
+def interpolation_weights(nodes: np.ndarray, interpolated_at: float) -> np.ndarray:
     """Interpolation weight (n,) of each node at a value; beyond the nodes, the end node alone counts."""
-    clipped = float(np.clip(value, nodes[0], nodes[-1]))
+    clipped = float(np.clip(interpolated_at, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, clipped)), 1), nodes.size - 1)
     weights_at = np.zeros(nodes.size)
     if nodes.size == 1:

@@ -84,18 +84,18 @@ class WheelProgress:
     has_been_freed: bool = False
 
 
-def wheel_step(step_data: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
+def wheel_step(step_data: WheelStep, rim_turning: float, force: Force) -> tuple[float, float, float, float]:
     """Speed of turning (rad/s) at the end of a step, mean force (N), mean slip and time locked (s).
 
-    turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
+    rim_turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
     """
-    slip = 1.0 - step_data.radius * turning / step_data.speed(0.0)
+    slip = 1.0 - step_data.radius * rim_turning / step_data.speed(0.0)
     progress = WheelProgress(0.0, slip)
     if slip > LOCKED_SLIP:
         stopping = force.locked_force * step_data.radius + step_data.mean_torque(0.0)
-        if stopping * step_data.step <= -step_data.inertia * turning:
-            return turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
-        _advance_at_slip(progress, -step_data.inertia * turning / stopping, force.locked_force, LOCKED_SLIP)
+        if stopping * step_data.step <= -step_data.inertia * rim_turning:
+            return rim_turning + stopping * step_data.step / step_data.inertia, force.locked_force, slip, 0.0
+        _advance_at_slip(progress, -step_data.inertia * rim_turning / stopping, force.locked_force, LOCKED_SLIP)
     while progress.time < step_data.step:
         if _stays_locked(step_data, progress, force):
             _advance_locked(step_data, progress, force)

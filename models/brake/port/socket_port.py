@@ -116,25 +116,31 @@ def listening_socket(address: int = 0) -> Iterator[socket.socket]:
 
 @contextmanager
 def controller_behind_socket(
-    words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
+    command_words: Sequence[str] | None, address: int, timeout: float, start_seconds: float, folder: Path = Path()
 ) -> Iterator[SocketPort]:
     """A controller behind a socket, as a context manager: started by a command, or connecting by itself.
 
-    words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
-    else starts; start : seconds until it must have connected; folder : in which the command runs. However the block
-    ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed where none connects.
+    command_words : the command, in which "{port}" stands for the number of the port; None waits for a controller that
+    somebody else starts; start_seconds : seconds until it must have connected; folder : in which the command runs.
+    However the block ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed
+    where none connects.
     """
-    with listening_socket(address) as server, _started_process(words, server.getsockname()[1], folder) as process:
-        link = _accepted_connection(server, process, start)
+    with (
+        listening_socket(address) as server,
+        _started_process(command_words, server.getsockname()[1], folder) as process,
+    ):
+        link = _accepted_connection(server, process, start_seconds)
         with link:
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             yield SocketPort(link, timeout, process)
 
 
-def _accepted_connection(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
-    """The first connection to ``server`` within ``start`` seconds, while the process runs."""
-    end = time.perf_counter() + start
-    server.settimeout(min(0.05, start))
+def _accepted_connection(
+    server: socket.socket, process: subprocess.Popen[bytes] | None, start_seconds: float
+) -> socket.socket:
+    """The first connection to ``server`` within ``start_seconds`` seconds, while the process runs."""
+    end = time.perf_counter() + start_seconds
+    server.settimeout(min(0.05, start_seconds))
     while time.perf_counter() < end:
         with suppress(TimeoutError):
             return server.accept()[0]
@@ -142,7 +148,7 @@ def _accepted_connection(server: socket.socket, process: subprocess.Popen[bytes]
         if status is not None:
             raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
     address = f"{LOOPBACK_ADDRESS}:{server.getsockname()[1]}"
-    raise RunFailed("controller", f"silence: nobody connected to {address} within {start:g} s; {START_REMEDY}")
+    raise RunFailed("controller", f"silence: nobody connected to {address} within {start_seconds:g} s; {START_REMEDY}")
 
 
 @contextmanager

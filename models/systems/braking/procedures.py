@@ -81,16 +81,16 @@ def engines_of(scene: BrakingScene, requested_engines: tuple[str, ...]) -> tuple
 
 
 def controlled_run(
-    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start: StartState, engine: str = ""
+    scene: BrakingScene, name: str, vehicle: BrakedVehicle, start_state: StartState, engine: str = ""
 ) -> BrakingPath:
     """One run from a start, with the scene's controller in the loop or with what is connected to the port. ``engine``
     is only a name, for files.
     """
     usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
-        return vehicle.run(usual, start, scene.run.duration)
+        return vehicle.run(usual, start_state, scene.run.duration)
     with controller_of_run(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
-        path = vehicle.run(controller, start, scene.run.duration)
+        path = vehicle.run(controller, start_state, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 
 
@@ -158,43 +158,43 @@ class Circle:
     radius: float
     sprung: bool = False
 
-    def state(self, unknown: np.ndarray) -> np.ndarray:
+    def state(self, unknowns: np.ndarray) -> np.ndarray:
         """Positions and rates (2, n) for these unknowns."""
-        positions_and_rates = np.zeros((2, unknown.size + 1))
+        positions_and_rates = np.zeros((2, unknowns.size + 1))
         positions_and_rates[0, 3:], positions_and_rates[1, 2 : 3 if self.sprung else None] = (
-            unknown[2:],
+            unknowns[2:],
             self.speed / self.radius,
         )
-        positions_and_rates[1, :2] = self.speed * np.cos(unknown[1]), self.speed * np.sin(unknown[1])
+        positions_and_rates[1, :2] = self.speed * np.cos(unknowns[1]), self.speed * np.sin(unknowns[1])
         return positions_and_rates
 
-    def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def motion(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) for these unknowns, and the wheels' speeds of turning (W,)."""
-        vehicle, state, steer = self.vehicle, self.state(unknown), steer_angles(self.vehicle, unknown[0])
+        vehicle, state, steer = self.vehicle, self.state(unknowns), steer_angles(self.vehicle, unknowns[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
         motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(state, steer, vehicle.on_road)
         return motion
 
-    def left(self, unknown: np.ndarray) -> np.ndarray:
+    def left(self, unknowns: np.ndarray) -> np.ndarray:
         """Residual accelerations (n - 1,), zero on a steady circle: first that across the path, then those of the other
         coordinates.
         """
-        rates, _ = self.motion(unknown)
-        across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
+        rates, _ = self.motion(unknowns)
+        across = rates[1] * np.cos(unknowns[1]) - rates[0] * np.sin(unknowns[1])
         return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
 
-    def solve_steady_circle(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
+    def solve_steady_circle(self, unknowns_guess: np.ndarray) -> tuple[np.ndarray, bool]:
         """Solution for the unknowns of a steady circle from a guess, and whether its residual accelerations vanish."""
         from scipy.optimize import root
 
-        unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
+        unknown: np.ndarray = root(self.left, unknowns_guess, tol=1e-12).x
         return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY_ACCELERATION)
 
-    def turn(self, unknown: np.ndarray) -> SteadyTurn:
+    def turn(self, unknowns: np.ndarray) -> SteadyTurn:
         """The steady turn, with which a procedure begins, for these unknowns."""
         return SteadyTurn(
-            steer_angles(self.vehicle, unknown[0]), StartState(self.state(unknown), self.motion(unknown)[1])
+            steer_angles(self.vehicle, unknowns[0]), StartState(self.state(unknowns), self.motion(unknowns)[1])
         )
 
 

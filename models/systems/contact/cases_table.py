@@ -180,23 +180,26 @@ def _forces(values: dict[str, Any], build: Build, method: Method, errors: bool =
 
 
 def _force_errors(
-    fine_forces: Any, coarse_forces: Any, limit: Array, a: Array, b: Array, share: Array, method: Method
+    fine_forces: Any, coarse_forces: Any, friction_limit: Array, a: Array, b: Array, share: Array, method: Method
 ) -> list[Array]:
-    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; limit : mu N; share : spin's
-    share of the creepage.
+    """Errors of forces (N) and moments (N m) from the finite cells and from the theory; friction_limit : mu N; share :
+    spin's share of the creepage.
     """
-    moment_limit = limit * np.maximum(a, b)
+    moment_limit = friction_limit * np.maximum(a, b)
     relative, relative_coarse = (
         np.divide(
-            [creep.fx, creep.fy, creep.mz], [limit, limit, moment_limit], out=np.zeros((3, limit.size)), where=limit > 0
+            [creep.fx, creep.fy, creep.mz],
+            [friction_limit, friction_limit, moment_limit],
+            out=np.zeros((3, friction_limit.size)),
+            where=friction_limit > 0,
         )
         for creep in (fine_forces, coarse_forces)
     )
     left = cells_error(relative, relative_coarse, method.cells, method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
-    theory = wider * limit * band(method.band, used, share)
+    theory = wider * friction_limit * band(method.band, used, share)
     moment = wider * moment_limit * moment_band(method.band, used_with_moment(used, relative[2]), share)
-    return [limit * left, theory, moment_limit * left, moment]
+    return [friction_limit * left, theory, moment_limit * left, moment]
 
 
 def _line(line_number: int, row: list[float], wrong: str | None) -> str:

@@ -243,10 +243,10 @@ def _value_and_seconds(roll: ForcesOfMotion, motion: Motion, repeats: int) -> tu
 
 
 def fastest_point(
-    points: list[TheoryPoint], target: float, error: Callable[[TheoryPoint], float]
+    points: list[TheoryPoint], target_error: float, error: Callable[[TheoryPoint], float]
 ) -> TheoryPoint | None:
-    """The fastest of the points whose error is at most ``target``; None if there is none."""
-    meets = [point for point in points if error(point) <= target]
+    """The fastest of the points whose error is at most ``target_error``; None if there is none."""
+    meets = [point for point in points if error(point) <= target_error]
     return min(meets, key=lambda point: point.seconds, default=None)
 
 
@@ -256,23 +256,25 @@ def ellipse_cases(
     load: float,
     friction: float,
     material_pair: MaterialPair,
-    levels: tuple[float, ...],
+    creepage_levels: tuple[float, ...],
     creepage_kinds: dict[str, Parts] = CREEPAGE_KINDS,
 ) -> list[ContactCase]:
     """Cases of every kind and level on one ellipse, their exact forces not yet computed."""
     return [
         ContactCase(a, b, load, friction, material_pair, kind, parts, level)
-        for (kind, parts), level in product(creepage_kinds.items(), levels)
+        for (kind, parts), level in product(creepage_kinds.items(), creepage_levels)
     ]
 
 
-def priced_theories(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -> Result:
+def priced_theories(scene: ContactScene, creepage_levels: tuple[float, ...], progress: Progress) -> Result:
     """Errors and seconds of every theory on every number of cells, on the scene's ellipse; the points are the detail.
 
-    levels : sizes of the creepage; at 1 the linear theory reaches mu N.
+    creepage_levels : sizes of the creepage; at 1 the linear theory reaches mu N.
     """
     hertz, built = hertz_of(scene), scene_contact(scene)
-    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
+    cases = ellipse_cases(
+        float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, creepage_levels
+    )
     known, points = list[ContactCase](), list[TheoryPoint]()
     for i, case in enumerate(cases):
         progress("exact theory", 0.5 * i / len(cases))

@@ -158,17 +158,17 @@ class TiltFilter:
         ]
         return (*([large] if self.normalised_innovation > DOUBTFUL_INNOVATION_LIMIT else []), *biased)
 
-    def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
+    def _check_balance(self, turning_acceleration: np.ndarray, rates: np.ndarray) -> None:
         """Refuse hub forces whose moments, integrated over time, do not give the measured rates of roll and pitch.
 
         A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
         stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
 
-        turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
+        turning_acceleration : (n, 2), rad/s^2; rates : (n, 2), rad/s.
         """
         dt, length = self.period, round(BALANCE_WINDOW / self.period)
         for first in range(0, len(rates) - 1, length):
-            turning_part, measured = turning[first : first + length + 1], rates[first : first + length + 1]
+            turning_part, measured = turning_acceleration[first : first + length + 1], rates[first : first + length + 1]
             if not np.isfinite(measured).all():
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(turning_part[1:] + turning_part[:-1], axis=0) * dt / 2))

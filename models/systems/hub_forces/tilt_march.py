@@ -18,19 +18,19 @@ class Noise(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def march(x, p, turning, measured, noise, innovation_sums, filtered):
+def march(x, p, turning_acceleration, measured, noise, innovation_sums, filtered):
     """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0; both are overwritten by
     those at the last sample.
 
-    turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was. Adds to sums (5, 4), of
-    every value's normalised innovations: how many, their sum, that of their squares, that of their products with the
-    one before, and the last one. Writes the states (n, 4) and their deviations into ``filtered`` (2, n, 4). Returns the
-    sum of the normalised innovations squared and how many there were.
+    turning_acceleration (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was. Adds to
+    sums (5, 4), of every value's normalised innovations: how many, their sum, that of their squares, that of their
+    products with the one before, and the last one. Writes the states (n, 4) and their deviations into ``filtered`` (2,
+    n, 4). Returns the sum of the normalised innovations squared and how many there were.
     """
     gain, surprise, used, variances = np.empty(4), 0.0, 0, noise.variances
     for i in range(len(measured)):
         if i:
-            _predict_step(x, p, turning[i - 1], noise)
+            _predict_step(x, p, turning_acceleration[i - 1], noise)
             for j in range(4):
                 if np.isnan(measured[i, j]):
                     continue
@@ -80,14 +80,14 @@ def _update_with_value(p, gain, j, variance, kept_share):
 
 
 @njit(cache=True, error_model="numpy")
-def _predict_step(x, p, turning, noise):
+def _predict_step(x, p, turning_acceleration, noise):
     """Predict one step: the angles change by their rates, the rates by an acceleration, and the covariance
     accordingly.
     """
     dt = noise.dt
     for k in range(2):
-        x[k] += dt * (x[2 + k] + 0.5 * dt * turning[k])
-        x[2 + k] += dt * turning[k]
+        x[k] += dt * (x[2 + k] + 0.5 * dt * turning_acceleration[k])
+        x[2 + k] += dt * turning_acceleration[k]
         for m in range(4):
             p[k, m] += dt * p[2 + k, m]
     for m in range(2):

@@ -81,7 +81,7 @@ class PitchStep:
 
 
 @cache
-def compiled_filter_step(mode: str, geometry: str) -> Any:
+def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
     """The compiled filter step with its derivatives for one mode and geometry, compiled when it is first requested.
 
     (x, step, count, inputs, rows, p, hats) -> (7, 12): x after it, its columns d/dx (7), d/d(first force sample) (2)
@@ -89,7 +89,7 @@ def compiled_filter_step(mode: str, geometry: str) -> Any:
     last sample share in each row of the inputs.
     """
     # the march goes in as Python: numba cannot cache what encloses compiled code
-    march = register_jitable(march_of(mode, geometry).py_func)
+    march = register_jitable(march_of(drive_mode, geometry).py_func)
 
     def respond(x, step, step_count, inputs, rows, p, hats):
         states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), p.copy()
@@ -111,7 +111,7 @@ def compiled_filter_step(mode: str, geometry: str) -> Any:
         transition[6, 0], transition[6, 7] = x[6], 1.0
         return transition
 
-    return compiled(respond, ("pitch_step", mode, geometry))
+    return compiled(respond, ("pitch_step", drive_mode, geometry))
 
 
 PITCH, PITCH_RATE, INERTIA_SHARE, FILTER_STATES = 2, 5, 6, 7
@@ -179,14 +179,19 @@ class PitchFilter(ExtendedKalmanFilter):
     """
 
     def __init__(
-        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measurement: Measurement
+        self,
+        step: PitchStep,
+        start_state: np.ndarray,
+        covariance: np.ndarray,
+        intensity: float,
+        measurement: Measurement,
     ) -> None:
-        """Initial state ``start`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample, per
-        step of the filter.
+        """Initial state ``start_state`` (7,) and ``covariance`` (7, 7); intensity : variance (N^2) of a force sample,
+        per step of the filter.
         """
         super().__init__(dim_x=FILTER_STATES, dim_z=1)
         self.step, self.intensity, self.measured = step, intensity, measurement
-        self.x, self.P = start.copy(), covariance.copy()
+        self.x, self.P = start_state.copy(), covariance.copy()
         self.late = np.zeros((FILTER_STATES, 2))
         self._there = np.isfinite(measurement.values) @ (1 << np.arange(len(measurement.columns)))
         self._seen = [self._model_of_columns(column_mask) for column_mask in range(1 << len(measurement.columns))]
@@ -309,12 +314,12 @@ def _covariance_inverse(matrix: np.ndarray) -> np.ndarray:
     return inverse
 
 
-def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
-    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by ``turn`` (rad)
-    and from ``inertia``, the standard deviation of the share by which 1/I is off.
+def _start(assembly: Assembly, turn_deviation: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
+    """State and covariance at the start. The covariance comes from a rotation of the whole vehicle by
+    ``turn_deviation`` (rad) and from ``inertia``, the standard deviation of the share by which 1/I is off.
     """
     p = assembly.parameters
-    rotated_state = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
+    rotated_state = turn_deviation * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
     covariance = np.outer(rotated_state, rotated_state) + KNOWN_DEVIATION**2 * np.eye(FILTER_STATES)
     covariance[INERTIA_SHARE, INERTIA_SHARE] += inertia**2
     return np.append(RELATIVE_STATES @ assembly.initial, 0.0), covariance

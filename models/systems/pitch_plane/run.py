@@ -100,7 +100,9 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     def longer(step_factor: float, share: float) -> Series:
         return rerun(_settings_of_longer_step(settings, step_factor, share))
 
-    return estimated(run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), sizes=sizes)
+    return estimated(
+        run, fine, longer, method.order, settings.step, growth=_pitch_error_growth(assembly), channel_sizes=sizes
+    )
 
 
 def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:

@@ -76,12 +76,12 @@ def noisy_reading(
     return read_samples(times, values, p.sampling_rate, scene, key_path) + noise[number]
 
 
-def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
+def within_range(effect: str, channels: Mapping[str, str], unit: str, sensor_range: float) -> Assumption:
     """Assumption that a sensor stays within its range; ``channels`` gives the run's channel for each name of a
     sensor.
     """
     says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
-    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -limit, limit)
+    return Assumption(f"{effect} in range", says, remedy, watch_function(**channels), unit, -sensor_range, sensor_range)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:

@@ -104,14 +104,14 @@ SMALLEST_PARAMETER = 1e-9
 """No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
 
 
-def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
+def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
     """Refuse parameters without a static equilibrium, in which every run begins."""
-    for name, value in p:
+    for name, value in parameters:
         if 0 < value < SMALLEST_PARAMETER:
             allowed = f"too small for a vehicle: at least {SMALLEST_PARAMETER:g}"
             raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
     try:
-        rest_state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+        rest_state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
         rest_state = np.full(8, np.nan)
     if not np.isfinite(rest_state).all():
@@ -210,9 +210,9 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     return assembly
 
 
-def _initial_state(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarray:
     """Initial state: the static equilibrium, except for the coordinates that the scene sets."""
-    state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():
         if name not in STATE_NAMES:
             raise InputError(scene.file, f"start.{name}", value, "not a state", STATE_NAMES)

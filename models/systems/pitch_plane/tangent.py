@@ -133,10 +133,10 @@ def compile_carry(one_step, key):
 
 
 @cache
-def march_along(compile_march: Any, mode: str, geometry: str) -> Any:
+def march_along(compile_march: Any, drive_mode: str, geometry: str) -> Any:
     """A march along the path for one mode and geometry, compiled when it is first requested."""
-    one_step = _step_of(RIGHT_HAND_SIDES[mode, geometry], mode == "force-body", geometry == "linear")
-    return compile_march(one_step, (mode, geometry))
+    one_step = _step_of(RIGHT_HAND_SIDES[drive_mode, geometry], drive_mode == "force-body", geometry == "linear")
+    return compile_march(one_step, (drive_mode, geometry))
 
 
 @dataclass(frozen=True)
@@ -205,14 +205,14 @@ class TangentPath:
         return self.step * np.arange(self.steps + 1)
 
 
-def path_of(assembly: Assembly, longest: float = LONGEST_STEP) -> TangentPath:
+def path_of(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> TangentPath:
     """The path of a free force-excited run; raises ValueError for a run of another kind."""
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
     if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(assembly.scene.run.duration / forces.period)
-    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
+    return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest_duration - 1e-9)), samples)
 
 
 def tilt_error_columns(assembly: Assembly) -> np.ndarray:
@@ -270,14 +270,14 @@ class CovarianceOverTime:
         return np.sqrt(self.matrices[:, i, i])
 
 
-def covariance(assembly: Assembly, deviation: float, longest: float = LONGEST_STEP) -> CovarianceOverTime:
+def covariance(assembly: Assembly, deviation: float, longest_duration: float = LONGEST_STEP) -> CovarianceOverTime:
     """Covariance of the state along a free force-excited run under white noise, given the noise's standard deviation
     (N) per sample.
 
-    longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
+    longest_duration : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
     every sample of a spline reaches into all periods.
     """
-    path = path_of(assembly, longest)
+    path = path_of(assembly, longest_duration)
     if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
         raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
     return CovarianceOverTime(path.forces.period * np.arange(path.samples + 1), noise_covariances(path, deviation))

@@ -122,13 +122,15 @@ def interpolation_error(path: TangentPath) -> np.ndarray:
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 
 
-def interpolation(assembly: Assembly, longest: float = LONGEST_STEP) -> GrowthCurve:
+def interpolation(assembly: Assembly, longest_duration: float = LONGEST_STEP) -> GrowthCurve:
     """Pitch error from the interpolation between samples alone; 0 for a run with too few samples to estimate it."""
-    path = path_of(assembly, longest)
+    path = path_of(assembly, longest_duration)
     return _growth_by_parameters(path, interpolation_error(path) if path.samples >= FEWEST_SAMPLES else None)
 
 
-def model_error_curve(assembly: Assembly, wrong_parameters: Parameters, longest: float = LONGEST_STEP) -> GrowthCurve:
+def model_error_curve(
+    assembly: Assembly, wrong_parameters: Parameters, longest_duration: float = LONGEST_STEP
+) -> GrowthCurve:
     """Pitch error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     The error that drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine
@@ -139,7 +141,9 @@ def model_error_curve(assembly: Assembly, wrong_parameters: Parameters, longest:
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
+    return _growth_by_parameters(
+        path_of(replace(assembly, parameters=mean), longest_duration), wrong_parameters=shifted
+    )
 
 
 def _growth_by_parameters(

@@ -32,9 +32,9 @@ BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Builder of a force-excited scene from overrides of parameters and further effects."""
 
 
-def perturbed_parameters(p: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
-    """Changed parameters by name: each is the value in ``p`` times its factor."""
-    return {name: getattr(p, name) * factor for name, factor in factors.items()}
+def perturbed_parameters(parameters: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
+    """Changed parameters by name: each is the value in ``parameters`` times its factor."""
+    return {name: getattr(parameters, name) * factor for name, factor in factors.items()}
 
 
 def measure(scene: Scene, error: bool = False) -> Result:

@@ -77,8 +77,8 @@ def _tyres(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumpt
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _raised_by(values: np.ndarray | Gaussian, offset: float) -> np.ndarray | Gaussian:
-    return replace(values, mean=values.mean + offset) if isinstance(values, Gaussian) else values + offset
+def _raised_by(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+    return replace(values, mean=values.mean + static_load) if isinstance(values, Gaussian) else values + static_load
 
 
 def _angle_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:

@@ -91,7 +91,9 @@ def with_error_of_drive(
         rerun,
         DRIVE_ORDER,
         step,
-        sizes={name: finite_rms(quasi_stationary_rows) for name, quasi_stationary_rows in fine.channels.items()},
+        channel_sizes={
+            name: finite_rms(quasi_stationary_rows) for name, quasi_stationary_rows in fine.channels.items()
+        },
     )
 
 

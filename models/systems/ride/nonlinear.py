@@ -265,9 +265,9 @@ def _with_error_of_steps(
     steps = len(table) // 2
     first = ROWS_APART * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / ROWS_APART)
 
-    def series(ride: Ride, begin: float) -> Series:
+    def series(ride: Ride, begin_time: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
-        return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
+        return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
 
     def rerun(step_factor: float, share: float) -> Series:
         longer, stride = (

@@ -25,7 +25,9 @@ def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
     return listed
 
 
-def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = True) -> Callable[[Result], Watched]:
+def _extreme_of_patches(
+    patch_value: Callable[[PatchReport], float], largest: bool = True
+) -> Callable[[Result], Watched]:
     """Return the watch function of a value: its largest or least among the patches of each wheel, over the
     positions.
     """
@@ -34,7 +36,7 @@ def _extreme_of_patches(value: Callable[[PatchReport], float], largest: bool = T
     def watched(run: Result) -> Watched:
         placed = run.detail.placed
         return {
-            f"{wheel} wheel": np.array([worst(map(value, getattr(position, wheel))) for position in placed])
+            f"{wheel} wheel": np.array([worst(map(patch_value, getattr(position, wheel))) for position in placed])
             for wheel in WHEEL_NAMES
         }
 

@@ -62,7 +62,7 @@ def run(scene: WheelsetScene, report_progress: Callable[[float], Any] = lambda s
     rows, why = list[ConicityRow](), dict[float, str]()
     for amplitude in conicity_table.amplitudes:
         try:
-            rows.append(conicity_row(table, amplitude, guess=conicity_table.near))
+            rows.append(conicity_row(table, amplitude, centre_guess=conicity_table.near))
         except InputError as error:
             rows.append(ConicityRow(amplitude, *[math.nan] * 5))
             why[amplitude] = error.allowed

@@ -215,7 +215,9 @@ def _reached_cycle(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
-    return attained_cycle(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
+    return attained_cycle(
+        equations_of(scene, "reference", speed), start_displacement=scene.run.displacement, step=scene.run.step
+    )
 
 
 def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:

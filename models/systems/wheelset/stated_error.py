@@ -59,7 +59,7 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
             lambda step_factor, share: principal_series(march_scene(with_step_factor(scene, step_factor, share))),
             RK4_ORDER,
             step,
-            sizes=sizes,
+            channel_sizes=sizes,
         )
     cells = scene.contact.cells
     other_cells = coarser_cells(cells) if cells >= FEWEST_CELLS else 2 * cells
@@ -113,7 +113,11 @@ def _coarse_run(scene: WheelsetScene, march_scene: March, cells: int) -> Series:
 
 
 def _of_steps(
-    scene: WheelsetScene, march_scene: March, fine_series: Series, coarse_series: Series, sizes: Mapping[str, float]
+    scene: WheelsetScene,
+    march_scene: March,
+    fine_series: Series,
+    coarse_series: Series,
+    channel_sizes: Mapping[str, float],
 ) -> dict[str, Estimate]:
     """Step errors over the whole path: those of its first part, enlarged as the errors of the cells grow."""
     power = 2.0**KINKED_ORDER
@@ -134,7 +138,7 @@ def _of_steps(
         )
         grown = max(1.0, difference_over_all / difference_at_start) if difference_at_start > 0.0 else 1.0
         error = remains * grown * _rms_difference(fine_series, first_part, name)
-        estimates[name] = Estimate(error, unit, error / sizes[name], KINKED_ORDER, scene.run.step)
+        estimates[name] = Estimate(error, unit, error / channel_sizes[name], KINKED_ORDER, scene.run.step)
     return estimates
 
 
@@ -149,14 +153,17 @@ def _rms_difference(fine_series: Series, other_series: Series, name: str, end_ti
 
 
 def with_error_of_cycles(
-    run: Result, orbits: Sequence[Orbit], coarse_orbits: Mapping[int, Orbit], unknown: str, cells: int
+    run: Result, orbits: Sequence[Orbit], coarse_orbits: Mapping[int, Orbit], sought_quantity: str, cells: int
 ) -> Result:
     """The result of limit cycles with the errors of the frequency and of the unknown that was solved for.
 
     Each cycle was also solved in half the step, which gives the error of the steps. ``coarse_orbits`` : some of them on
     half the cells, by their index.
     """
-    units, estimates = {unknown: "m" if unknown == "amplitude" else "m/s", "frequency": "Hz"}, dict[str, Estimate]()
+    units, estimates = (
+        {sought_quantity: "m" if sought_quantity == "amplitude" else "m/s", "frequency": "Hz"},
+        dict[str, Estimate](),
+    )
     for name, unit in units.items():
         size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
         changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]

@@ -68,19 +68,19 @@ def stamps(written: Callable[[datetime], str], began: datetime = BEGAN) -> tuple
     return tuple(written(began + timedelta(milliseconds=10 * i)) for i in range(len(TIMES)))
 
 
-def clock(stamp: datetime) -> str:
+def clock(time_stamp: datetime) -> str:
     """Hours, minutes, seconds and thousandths."""
-    return stamp.strftime("%H:%M:%S.%f")[:-3]
+    return time_stamp.strftime("%H:%M:%S.%f")[:-3]
 
 
-def iso(stamp: datetime) -> str:
+def iso(time_stamp: datetime) -> str:
     """ISO 8601 without a zone."""
-    return stamp.isoformat(timespec="milliseconds")
+    return time_stamp.isoformat(timespec="milliseconds")
 
 
-def german(stamp: datetime) -> str:
+def german(time_stamp: datetime) -> str:
     """Day, month and year, with a decimal comma."""
-    return stamp.strftime("%d.%m.%Y %H:%M:%S,%f")[:-3]
+    return time_stamp.strftime("%d.%m.%Y %H:%M:%S,%f")[:-3]
 
 
 GERMAN = Form(separator=";", decimal=",")

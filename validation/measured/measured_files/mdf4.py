@@ -40,7 +40,7 @@ def signals(
     *groups: dict[str, Any],
     version: str = "4.10",
     compression: Literal[0, 2] = 0,
-    start: datetime | None = None,
+    start_date: datetime | None = None,
     times: np.ndarray = TIMES,
     families: tuple[str, ...] = (),
 ) -> Make:
@@ -51,8 +51,8 @@ def signals(
 
         path = folder / ("odd.mdf" if version < "4" else "odd.mf4")
         file = MDF(version=version)
-        if start is not None:
-            file.header.start_time = start
+        if start_date is not None:
+            file.header.start_time = start_date
         for group, family in zip(groups, families or [""] * len(groups), strict=True):
             plain = {name: data if isinstance(data, dict) else {"samples": data} for name, data in group.items()}
             file.append(
@@ -73,40 +73,48 @@ USUAL_CHANNELS = {"Fz": FZ, "Fx": FX}
 MDF4, MDF3 = plain(".mf4"), signals(USUAL_CHANNELS, version="3.30")
 
 
-def block(data: bytes, kind: bytes) -> int:
+def block(raw_bytes: bytes, block_kind: bytes) -> int:
     """Byte where the first block of a kind begins."""
-    return next(i for i in range(0, len(data), 8) if data[i : i + 4] == kind)
+    return next(i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == block_kind)
 
 
-def inside(data: bytes, kind: bytes, offset: int, new_bytes: bytes) -> bytes:
+def inside(raw_bytes: bytes, block_kind: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
     """Other bytes in a block's data, which stand after its links."""
-    block_start = block(data, kind)
+    block_start = block(raw_bytes, block_kind)
     return patched(
-        data, block_start + DATA + 8 * struct.unpack_from("<Q", data, block_start + 16)[0] + offset, new_bytes
+        raw_bytes,
+        block_start + DATA + 8 * struct.unpack_from("<Q", raw_bytes, block_start + 16)[0] + byte_offset,
+        new_bytes,
     )
 
 
-def changed(kind: bytes, offset: int, new_bytes: bytes, make_file: Make = MDF4) -> Make:
+def changed(block_kind: bytes, byte_offset: int, new_bytes: bytes, make_file: Make = MDF4) -> Make:
     """Make a file with other bytes in a block's data."""
-    return altered(make_file, lambda data: inside(data, kind, offset, new_bytes))
+    return altered(make_file, lambda data: inside(data, block_kind, byte_offset, new_bytes))
 
 
-def linked(kind: bytes, offset: int, new_number: int) -> Make:
+def linked(block_kind: bytes, byte_offset: int, new_number: int) -> Make:
     """Make the usual file with another number in the head or a link of a block."""
-    return altered(MDF4, lambda data: patched(data, block(data, kind) + offset, struct.pack("<Q", new_number)))
+    return altered(
+        MDF4, lambda data: patched(data, block(data, block_kind) + byte_offset, struct.pack("<Q", new_number))
+    )
 
 
-def looped(kind: bytes) -> Make:
+def looped(block_kind: bytes) -> Make:
     """Make the usual file with a block that follows itself."""
-    return altered(MDF4, lambda data: patched(data, block(data, kind) + DATA, struct.pack("<Q", block(data, kind))))
+    return altered(
+        MDF4, lambda data: patched(data, block(data, block_kind) + DATA, struct.pack("<Q", block(data, block_kind)))
+    )
 
 
-def clocked(offset: int, new_bytes: bytes) -> Make:
+def clocked(byte_offset: int, new_bytes: bytes) -> Make:
     """Make the usual file whose master channel is another one; its block has its kind, 2, after eight links."""
 
-    def change(data: bytes) -> bytes:
-        master = next(i for i in range(0, len(data), 8) if data[i : i + 4] == b"##CN" and data[i + 88] == 2)
-        return patched(data, master + 88 + offset, new_bytes)
+    def change(raw_bytes: bytes) -> bytes:
+        master = next(
+            i for i in range(0, len(raw_bytes), 8) if raw_bytes[i : i + 4] == b"##CN" and raw_bytes[i + 88] == 2
+        )
+        return patched(raw_bytes, master + 88 + byte_offset, new_bytes)
 
     return altered(MDF4, change)
 
@@ -206,7 +214,7 @@ NAMED: Files = {
     ),
     "MDF 4 with a start without zone": (
         "eight o'clock where",
-        signals(USUAL_CHANNELS, start=datetime(2026, 11, 21, 8)),
+        signals(USUAL_CHANNELS, start_date=datetime(2026, 11, 21, 8)),
         "is not used",
     ),
     "MDF 4 called odd.tdms": ("the extension says otherwise", called(".mf4", "odd.tdms"), "extension"),
@@ -214,7 +222,7 @@ NAMED: Files = {
 RIGHT: Files = {
     "MDF 3": (
         "another layout, the same samples",
-        signals(USUAL_CHANNELS, version="3.30", start=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
+        signals(USUAL_CHANNELS, version="3.30", start_date=datetime.fromisoformat("2026-11-21T08:00:00+00:00")),
     ),
     "MDF 4 packed": ("samples are deflated", signals(USUAL_CHANNELS, compression=2)),
     "MDF 4 of two rates": ("a common clock does not exist", two_rates(".mf4"), TWO_RATES),

@@ -121,13 +121,13 @@ def _state(folder: Path) -> dict[str, str]:
     return {str(p): hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def read(measurement_source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and values of every channel, read in several blocks."""
     channels: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for group in {channel.group for channel in source.channels}:
-        names = [channel.name for channel in source.channels if channel.group == group]
-        count = next(channel.count for channel in source.channels if channel.group == group)
-        blocks = list(source.blocks(names, 1 + count // (6 if len(names) < 100 else 1)))
+    for group in {channel.group for channel in measurement_source.channels}:
+        names = [channel.name for channel in measurement_source.channels if channel.group == group]
+        count = next(channel.count for channel in measurement_source.channels if channel.group == group)
+        blocks = list(measurement_source.blocks(names, 1 + count // (6 if len(names) < 100 else 1)))
         sample_times, values = (
             np.concatenate([getattr(block, key) for block in blocks]) for key in ("times", "values")
         )
@@ -135,12 +135,12 @@ def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return channels
 
 
-def difference(source: Source, truth: Truth, expected_text: str) -> float:
+def difference(measurement_source: Source, truth: Truth, expected_text: str) -> float:
     """Largest difference between a file and the expected values; infinite if a channel, a sample or the reader's
     message is missing."""
     channels, finding_texts = (
-        read(source),
-        [finding.text for finding in source.noticed if finding.weight != "note" or expected_text],
+        read(measurement_source),
+        [finding.text for finding in measurement_source.noticed if finding.weight != "note" or expected_text],
     )
     if set(channels) != set(truth) or not (
         any(expected_text in text for text in finding_texts) if expected_text else not finding_texts
@@ -171,25 +171,25 @@ def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarra
     return write(path, [group])
 
 
-def raw(data: bytes, name: str = "odd.csv") -> Make:
+def raw(raw_bytes: bytes, name: str = "odd.csv") -> Make:
     """Make a file of bytes."""
 
     def make(folder: Path) -> Path:
-        (folder / name).write_bytes(data)
+        (folder / name).write_bytes(raw_bytes)
         return folder / name
 
     return make
 
 
-def plain(extension: str) -> Make:
+def plain(file_extension: str) -> Make:
     """Make the usual file."""
-    return lambda folder: written(folder / f"odd{extension}")
+    return lambda folder: written(folder / f"odd{file_extension}")
 
 
-def wide(extension: str) -> Make:
+def wide(file_extension: str) -> Make:
     """Make a file of 300 channels."""
     table = np.column_stack([values for _, values in MANY_CHANNELS.values()])
-    return lambda folder: written(folder / f"odd{extension}", tuple(MANY_CHANNELS), table)
+    return lambda folder: written(folder / f"odd{file_extension}", tuple(MANY_CHANNELS), table)
 
 
 def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
@@ -203,12 +203,12 @@ def altered(make_file: Make, change: Callable[[bytes], bytes], name: str = "") -
     return altered_file
 
 
-def patched(data: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
+def patched(raw_bytes: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
     """Bytes of a file, in which ``new_bytes`` replaces those from an offset on."""
-    return data[:byte_offset] + new_bytes + data[byte_offset + len(new_bytes) :]
+    return raw_bytes[:byte_offset] + new_bytes + raw_bytes[byte_offset + len(new_bytes) :]
 
 
-def two_rates(extension: str) -> Make:
+def two_rates(file_extension: str) -> Make:
     """Make a file of two groups of different rates."""
     clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
 
@@ -216,14 +216,14 @@ def two_rates(extension: str) -> Make:
         groups = [
             ChannelGroup((name,), ("N",), ("",), period, COUNT, [samples[:, None]]) for name, period, samples in clocks
         ]
-        return write(folder / f"odd{extension}", groups)
+        return write(folder / f"odd{file_extension}", groups)
 
     return make
 
 
-def called(extension: str, name: str) -> Make:
+def called(file_extension: str, name: str) -> Make:
     """Make the usual file under another name."""
-    return altered(plain(extension), bytes, name)
+    return altered(plain(file_extension), bytes, name)
 
 
 @dataclass(frozen=True)
@@ -250,9 +250,9 @@ class CutSweep:
         )
         return sum(self._is_silent(path, data[:cut_length], truth) for cut_length in cut_lengths)
 
-    def _is_silent(self, path: Path, data: bytes, truth: Truth) -> bool:
+    def _is_silent(self, path: Path, raw_bytes: bytes, truth: Truth) -> bool:
         """Whether one cut is not noticed by the reader."""
-        path.write_bytes(data)
+        path.write_bytes(raw_bytes)
         try:
             source = open_source(path)
             complete_truth = {

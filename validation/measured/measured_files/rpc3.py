@@ -30,23 +30,26 @@ RPC = plain(".rsp")
 def with_parameters(make_file: Make = RPC, **changed: str | None) -> Make:
     """Function that makes a file with some header parameters changed (``_`` stands for ``.``) or, for None, removed."""
 
-    def change(data: bytes) -> bytes:
-        values = _values(data)
+    def change(raw_bytes: bytes) -> bytes:
+        values = _values(raw_bytes)
         size = BLOCK * int(values["NUM_HEADER_BLOCKS"])
         names = {name.replace(".", "_"): name for name in values}
         values |= {names.get(key, key): value for key, value in changed.items()}
         given_parameters = {name: value for name, value in values.items() if value is not None}
         given_parameters["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(given_parameters))
         latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in given_parameters.items()]
-        return b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0") + data[size:]
+        return (
+            b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0")
+            + raw_bytes[size:]
+        )
 
     return altered(make_file, change)
 
 
-def _values(data: bytes) -> dict[str, Any]:
+def _values(raw_bytes: bytes) -> dict[str, Any]:
     """Header parameters of a file, by name."""
-    count = int(data[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
-    records = [data[i * RECORD : (i + 1) * RECORD] for i in range(count)]
+    count = int(raw_bytes[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
+    records = [raw_bytes[i * RECORD : (i + 1) * RECORD] for i in range(count)]
     texts = [
         [header_part.rstrip(b"\0").decode("latin-1") for header_part in (record[:KEY], record[KEY:])]
         for record in records
@@ -59,9 +62,9 @@ DIGITS = np.pad(np.tile(np.arange(COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POI
 SCALED = with_parameters(DATA_TYPE="SHORT_INTEGER", SCALE_CHAN_1="0.015625", SCALE_CHAN_2="-2.5")
 
 
-def sample(value: float) -> Make:
+def sample(sample_value: float) -> Make:
     """Make the usual file with another value at sample 5 of the first channel."""
-    new = np.array([value], "<f4").tobytes()
+    new = np.array([sample_value], "<f4").tobytes()
     return altered(RPC, lambda data: patched(data, len(data) - 2 * POINTS * 4 + 5 * 4, new))
 
 

@@ -52,12 +52,12 @@ def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
     return make
 
 
-def changed(offset: int, new_bytes: bytes, length: int | None = None) -> Make:
+def changed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Make:
     """Make the usual file with changed bytes, or cut off; the offset counts from the start of its last segment."""
 
-    def change(data: bytes) -> bytes:
-        begin = data.rindex(b"TDSm")
-        return patched(data, begin + offset, new_bytes)[: None if length is None else begin + length]
+    def change(raw_bytes: bytes) -> bytes:
+        begin = raw_bytes.rindex(b"TDSm")
+        return patched(raw_bytes, begin + byte_offset, new_bytes)[: None if length is None else begin + length]
 
     return altered(TDMS, change)
 

@@ -128,9 +128,9 @@ class BrakingStop:
             for n in substep_counts
         )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` that divides a sample."""
-        substeps = math.ceil(SAMPLE / value * (1 - 1e-9))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` that divides a sample."""
+        substeps = math.ceil(SAMPLE / step_or_tolerance * (1 - 1e-9))
         return Setting(
             engine,
             method,

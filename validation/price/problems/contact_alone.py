@@ -81,9 +81,9 @@ class ContactAlone:
             for cells in CELLS.get(theory.name, _STRIPS)
         )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
+    def setting(self, engine: str, method: str, inverse_cells: float) -> Setting:
         """A setting of this problem: curve, and 1 / number of cells as its value."""
-        cells = round(1.0 / value)
+        cells = round(1.0 / inverse_cells)
         usual = (self._ways[engine, method].name, cells) == DEFAULT_ANSWER
         return Setting(engine, method, 1.0 / cells, 0, default="twinrig" if usual else "", cells=True)
 

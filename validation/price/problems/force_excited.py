@@ -115,10 +115,11 @@ class ForceExcited:
         """All settings, or their named share."""
         return settings_of_curves(self.quick if quick else self.full, self.setting)
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem: curve, and the longest step (s) up to ``value`` such that every force sample falls
-        on a step."""
-        return setting(engine, method, PERIOD / math.ceil(PERIOD / value * (1 - 1e-9)))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting of this problem: curve, and the longest step (s) up to ``step_or_tolerance`` such that every force
+        sample falls on a step.
+        """
+        return setting(engine, method, PERIOD / math.ceil(PERIOD / step_or_tolerance * (1 - 1e-9)))
 
     def build(self, setting: Setting) -> Model:
         """The vehicle in one engine."""

@@ -147,11 +147,12 @@ class FreeVehicle:
         """The settings FULL_STEPS, also in the quick share, since the reference alone takes seconds."""
         return settings_of_curves(FULL_STEPS, self.setting)
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps; or
-        a tolerance."""
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
+        on steps; or a tolerance.
+        """
         known = CATALOGUE[engine][method.split()[0]]
-        step = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
+        step = step_or_tolerance if known.adaptive else GRID / np.ceil(GRID / step_or_tolerance * (1 - 1e-9))
         return setting(engine, method, float(step))
 
     def build(self, setting: Setting) -> FreeVehicleSolver:

@@ -153,9 +153,11 @@ class InertialUnit:
             QUICK if quick else FULL_RATES, lambda engine, method, rate: self.setting(engine, method, 1 / rate)
         )
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting: curve, and the longest step (s) up to ``value`` for which all compared instants fall on steps."""
-        step = GRID / np.ceil(GRID / value * (1 - 1e-9))
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
+        """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
+        on steps.
+        """
+        step = GRID / np.ceil(GRID / step_or_tolerance * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
         return Setting(

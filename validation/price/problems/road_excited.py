@@ -114,12 +114,12 @@ def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
     return engine_settings(setting, duration)
 
 
-def setting(engine: str, method: str, value: float) -> Setting:
+def setting(engine: str, method: str, step_or_tolerance: float) -> Setting:
     """A setting of this problem, with what the catalogue declares about its method."""
     known = CATALOGUE[engine][method.split()[0]]
     order = 0 if method == "LSODA" else known.order
-    default = DEFAULTS.get((engine, method, value), "")
-    return Setting(engine, method, value, order, known.adaptive, STAGES.get(method, 0), default)
+    default = DEFAULTS.get((engine, method, step_or_tolerance), "")
+    return Setting(engine, method, step_or_tolerance, order, known.adaptive, STAGES.get(method, 0), default)
 
 
 def settings(quick: bool) -> tuple[Setting, ...]:

@@ -38,7 +38,7 @@ class Attitudes:
 
 
 def in_mujoco(
-    method: str, sample_period: float, step_count: int, stride: int, start: np.ndarray, gyro: Gyro
+    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in MuJoCo: ``step_count`` steps of ``sample_period`` (s) from an attitude (4,),
     of which every ``stride``-th is kept.
@@ -55,16 +55,16 @@ def in_mujoco(
         path, _ = rollout.rollout(
             model,
             mujoco.MjData(model),
-            np.concatenate([[0.0], start, rates[0]])[None],
+            np.concatenate([[0.0], start_attitude, rates[0]])[None],
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    attitudes = np.vstack([start, path[0, stride - 1 :: stride, 1:5]])
+    attitudes = np.vstack([start_attitude, path[0, stride - 1 :: stride, 1:5]])
     return _sound("mujoco", attitudes, {"steps": step_count, "force calls": (4 if method == "RK4" else 1) * step_count})
 
 
 def in_exudyn(
-    method: str, sample_period: float, step_count: int, stride: int, start: np.ndarray, gyro: Gyro
+    method: str, sample_period: float, step_count: int, stride: int, start_attitude: np.ndarray, gyro: Gyro
 ) -> Attitudes:
     """Attitudes of the rotating sphere in Exudyn; raises Refused for methods whose steps cannot end on samples."""
     name = method.split()[0]
@@ -79,7 +79,7 @@ def in_exudyn(
         else (gyro(sample_times + NUDGE) - gyro(sample_times - NUDGE)) / 2 / NUDGE
     )
     implicit = name in ("GeneralizedAlpha", "TrapezoidalIndex2")
-    mbs, sensor = _sphere(start, rates[0], pushed.tolist(), sample_period, implicit, known.holds)
+    mbs, sensor = _sphere(start_attitude, rates[0], pushed.tolist(), sample_period, implicit, known.holds)
     options = exu.SimulationSettings()
     options.solution.file.write, options.solution.sensors.active = False, True
     options.solution.sensors.writePeriod = sample_period * stride
@@ -89,12 +89,12 @@ def in_exudyn(
     stored = mbs.GetSensorStoredData(sensor)[:, 1:]
     if note or len(stored) != step_count // stride + 1:
         raise RunFailed("exudyn", "the solver reported failure", sample_period * stride * len(stored))
-    attitudes = start + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
+    attitudes = start_attitude + stored[:, 3:] if implicit else from_matrix(stored.reshape(-1, 3, 3))
     return _sound("exudyn", attitudes, solver_counts(mbs))
 
 
 def _sphere(
-    start: np.ndarray,
+    start_attitude: np.ndarray,
     rate: np.ndarray,
     torques: list[list[float]],
     sample_period: float,
@@ -106,9 +106,9 @@ def _sphere(
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
-        kind, attitude, rates = items.NodeRigidBodyEP, start, 0.5 * quaternion_product(start, turning)
+        kind, attitude, rates = items.NodeRigidBodyEP, start_attitude, 0.5 * quaternion_product(start_attitude, turning)
     else:
-        kind, attitude, rates = items.NodeRigidBodyRotVecLG, rotation_vector(start), rate
+        kind, attitude, rates = items.NodeRigidBodyRotVecLG, rotation_vector(start_attitude), rate
     node = mbs.AddNode(kind(referenceCoordinates=still + attitude.tolist(), initialVelocities=still + rates.tolist()))
     body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     row = [0]

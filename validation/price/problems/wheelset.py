@@ -163,9 +163,9 @@ class RollingWheels:
             )
         return curves
 
-    def setting(self, engine: str, method: str, value: float) -> Setting:
+    def setting(self, engine: str, method: str, step_or_tolerance: float) -> Setting:
         """A setting of this problem: curve, and step (s) or tolerance."""
-        made_setting = setting(engine, method, value)
+        made_setting = setting(engine, method, step_or_tolerance)
         keeps_order = made_setting.order <= (2 if self.wheels.speed >= SMOOTH_SPEED else 1)
         return made_setting if keeps_order else replace(made_setting, order=0, nominal=made_setting.order)
 
@@ -196,11 +196,11 @@ class RollingWheels:
     def _channel_errors(self, channels: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
-    def _run_by_method(self, method: str, value: float) -> WheelsetResult:
+    def _run_by_method(self, method: str, step_or_tolerance: float) -> WheelsetResult:
         """Final state by the written equations: RK4 with steps, or a scipy method at a relative tolerance."""
         state, numbers = self._start.copy(), self.wheels.numbers
         if method == "RK4":
-            steps = round(DURATION / value)
+            steps = round(DURATION / step_or_tolerance)
             march(state, numbers, self._table, DURATION / steps, steps)
             return WheelsetResult(state, {"steps": steps, "force calls": 4 * steps})
 
@@ -208,7 +208,9 @@ class RollingWheels:
             rates(y, numbers, self._table, state_rate := np.empty(y.size))
             return state_rate
 
-        solution = solve_ivp(derivative, (0.0, DURATION), state, method, rtol=value, atol=1e-6 * value)
+        solution = solve_ivp(
+            derivative, (0.0, DURATION), state, method, rtol=step_or_tolerance, atol=1e-6 * step_or_tolerance
+        )
         if not solution.success:
             raise RunFailed("reference", solution.message)
         return WheelsetResult(solution.y[:, -1], {"steps": solution.t.size - 1, "force calls": int(solution.nfev)})

@@ -139,7 +139,7 @@ def _tables(vehicle: SpatialVehicle) -> str:
     return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
 
 
-def _table(heads: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+def _table(headings: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
     """Text of a table; its numbers have all digits."""
     text_rows = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
-    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *text_rows))
+    return "\n".join(f"| {' | '.join(row)} |" for row in (headings, ("---",) * len(headings), *text_rows))

@@ -42,25 +42,25 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
         yield kinds[i % len(kinds)](rng, i)
 
 
-def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
+def _scene(generator: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
     """Random ride scene, with random level, corners and correlation of the road."""
     road = {
-        "level": float(10 ** rng.uniform(-6.0, -4.3)),
-        "corner_mean": float(rng.uniform(0.02, 0.5)),
-        "corner_roll": float(rng.uniform(0.6, 3.0)),
+        "level": float(10 ** generator.uniform(-6.0, -4.3)),
+        "corner_mean": float(generator.uniform(0.02, 0.5)),
+        "corner_roll": float(generator.uniform(0.6, 3.0)),
     }
-    road |= {"cutoff": float(rng.uniform(8.0, 40.0))} if rng.random() < 0.5 else {}
+    road |= {"cutoff": float(generator.uniform(8.0, 40.0))} if generator.random() < 0.5 else {}
     vehicle = {"file": file, "operating_point": point}
     return build({"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **tables}, "sample.toml")
 
 
-def _varied_vehicle(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
+def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with random changes of stiffnesses and dampings."""
     springs = tuple(
-        replace(s, stiffness=s.stiffness * rng.uniform(0.6, 1.6), damping=s.damping * rng.uniform(0.5, 1.8))
+        replace(s, stiffness=s.stiffness * generator.uniform(0.6, 1.6), damping=s.damping * generator.uniform(0.5, 1.8))
         for s in vehicle.springs
     )
-    tyres = tuple(replace(t, stiffness=t.stiffness * rng.uniform(0.7, 1.4)) for t in vehicle.tyres)
+    tyres = tuple(replace(t, stiffness=t.stiffness * generator.uniform(0.7, 1.4)) for t in vehicle.tyres)
     return replace(vehicle, springs=springs, tyres=tyres)
 
 
@@ -71,12 +71,12 @@ def _sample_of(
     return Sample(name, engine, estimates, true_errors, calls, extra)
 
 
-def _sample_of_sweep(rng: np.random.Generator, sample_number: int) -> Sample:
+def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from the deviations of a linear vehicle at nine speeds, whose truth is computed in extended precision."""
-    file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
-    engine = str(rng.choice(["reference", *ENGINES]))
-    scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
-    vehicle = _varied_vehicle(rng, vehicle_of(scene))
+    file = str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    engine = str(generator.choice(["reference", *ENGINES]))
+    scene = _scene(generator, file, speeds={"values": sorted(generator.uniform(2.0, 60.0, 9).tolist())})
+    vehicle = _varied_vehicle(generator, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, deviation = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
     true = np.array([exact_deviations(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
@@ -127,14 +127,17 @@ def _exponential(A: np.ndarray) -> np.ndarray:
     return total
 
 
-def _sample_of_drive(rng: np.random.Generator, sample_number: int) -> Sample:
+def _sample_of_drive(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from a drive with two sections, whose truth has steps eight times shorter (error about 1e-9 of the step's
     own)."""
-    first = float(rng.choice([0.0, rng.uniform(2.0, 15.0)]))
-    drive = {"time": [0.0, float(rng.uniform(1.0, 2.0)), 3.0], "speed": [first, *rng.uniform(3.0, 30.0, 2).tolist()]}
-    scene = _scene(rng, "quarter_car", drive=drive, study="ride_drive")
-    vehicle = _varied_vehicle(rng, vehicle_of(scene))
-    engine = str(rng.choice(["reference", *ENGINES]))
+    first = float(generator.choice([0.0, generator.uniform(2.0, 15.0)]))
+    drive = {
+        "time": [0.0, float(generator.uniform(1.0, 2.0)), 3.0],
+        "speed": [first, *generator.uniform(3.0, 30.0, 2).tolist()],
+    }
+    scene = _scene(generator, "quarter_car", drive=drive, study="ride_drive")
+    vehicle = _varied_vehicle(generator, vehicle_of(scene))
+    engine = str(generator.choice(["reference", *ENGINES]))
     result = run(scene, engine, vehicle=vehicle, error=True)
     road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
     fine = varying_speed(
@@ -153,16 +156,16 @@ def _sample_of_drive(rng: np.random.Generator, sample_number: int) -> Sample:
     )
 
 
-def _sample_of_copies(rng: np.random.Generator, sample_number: int) -> Sample:
+def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from Monte Carlo copies and statistical linearisation of a nonlinear quarter car; the truth has many more
     copies and shorter steps. Both contain random scatter."""
-    speed = float(rng.uniform(5.0, 35.0))
-    scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
+    speed = float(generator.uniform(5.0, 35.0))
+    scene = _scene(generator, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=sample_number)
     result = linearised_result(scene, vehicle, sampling, lambda text, share: None, error=True)
     run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
     fine = copies_in_time(
-        vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest=run.step / 4.0
+        vehicle, road, speed, 10.0, copies=TRUTH_COPIES, seed=1000 + sample_number, longest_step=run.step / 4.0
     )
     chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
     estimates, true = dict[str, Estimate](), dict[str, float]()
@@ -183,16 +186,16 @@ def _sample_of_copies(rng: np.random.Generator, sample_number: int) -> Sample:
     )
 
 
-def _sample_in_time(rng: np.random.Generator, sample_number: int) -> Sample:
+def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sample:
     """Sample from a run in time with nonlinear springs or tyres that lift, whose truth has much shorter steps on the
     same road."""
-    bent, speed = rng.random() < 0.5, float(rng.uniform(5.0, 40.0))
-    file = "quarter_car_nonlinear" if bent else str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    bent, speed = generator.random() < 0.5, float(generator.uniform(5.0, 40.0))
+    file = "quarter_car_nonlinear" if bent else str(generator.choice(["quarter_car", "half_car", "seven_freedoms"]))
     tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
     tables |= {} if bent else {"effects": {"lift_off": {}}}
-    scene = _scene(rng, file, "loaded", **tables)
-    vehicle, engine = _varied_vehicle(rng, vehicle_of(scene)), str(rng.choice(ENGINES))
-    sampling = Sampling(step=float(10 ** rng.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
+    scene = _scene(generator, file, "loaded", **tables)
+    vehicle, engine = _varied_vehicle(generator, vehicle_of(scene)), str(generator.choice(ENGINES))
+    sampling = Sampling(step=float(10 ** generator.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=sample_number)
     road = excitation_of(scene, wheels(vehicle))
     path = _path(scene, engine, vehicle, sampling, road, speed)
     steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER_STEPS)

@@ -23,18 +23,21 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return drawn_samples(sample_count, seed, lambda random: _sample_of_position(_draw_scene(random)))
 
 
-def _draw_scene(rng: np.random.Generator) -> WheelRailScene:
-    start = float(rng.uniform(-0.004, 0.004))
-    rolls = rng.random() < 0.6
-    case = {"yaw": float(rng.uniform(0.0, 3.0)), "friction": float(rng.uniform(0.1, 0.5))} if rolls else {}
+def _draw_scene(generator: np.random.Generator) -> WheelRailScene:
+    start = float(generator.uniform(-0.004, 0.004))
+    rolls = generator.random() < 0.6
+    case = {"yaw": float(generator.uniform(0.0, 3.0)), "friction": float(generator.uniform(0.1, 0.5))} if rolls else {}
     return build(
         {
             "title": "a random held wheelset",
             "system": "wheel-rail",
-            "wheelset": {"load": float(10.0 ** rng.uniform(3.7, 5.0)), "radius": float(rng.uniform(0.35, 0.6))},
-            "profiles": {"inclination": float(rng.choice([0.025, 0.05]))},
+            "wheelset": {
+                "load": float(10.0 ** generator.uniform(3.7, 5.0)),
+                "radius": float(generator.uniform(0.35, 0.6)),
+            },
+            "profiles": {"inclination": float(generator.choice([0.025, 0.05]))},
             "positions": {"start": start, "stop": start + 0.004, "count": POSITION_COUNT},
-            "method": {"cells": int(rng.integers(10, 24))},
+            "method": {"cells": int(generator.integers(10, 24))},
             "cases": {"one": case},
         }
     )

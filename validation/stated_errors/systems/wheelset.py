@@ -32,31 +32,36 @@ def samples(sample_count: int, seed: int) -> Iterator[Sample]:
     return drawn_samples(sample_count, seed, lambda random: _sample_of_path(*_draw_scene(random)))
 
 
-def _draw_scene(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
-    speed, profiled = float(rng.uniform(8.0, 90.0)), rng.random() < 0.25
+def _draw_scene(generator: np.random.Generator) -> tuple[WheelsetScene, str, float]:
+    speed, profiled = float(generator.uniform(8.0, 90.0)), generator.random() < 0.25
     override = {
-        "stiffness_x": 10.0 ** rng.uniform(4.7, 6.3),
-        "damping_x": 10.0 ** rng.uniform(2.0, 4.0),
-        "friction": rng.uniform(0.15, 0.5),
-        "load": 10.0 ** rng.uniform(4.7, 5.2),
-        "conicity": rng.uniform(0.03, 0.2),
+        "stiffness_x": 10.0 ** generator.uniform(4.7, 6.3),
+        "damping_x": 10.0 ** generator.uniform(2.0, 4.0),
+        "friction": generator.uniform(0.15, 0.5),
+        "load": 10.0 ** generator.uniform(4.7, 5.2),
+        "conicity": generator.uniform(0.03, 0.2),
     }
-    law = "linear" if rng.random() < 0.2 else "fastsim"
+    law = "linear" if generator.random() < 0.2 else "fastsim"
     table: dict[str, Any] = {
         "title": "a random wheelset",
         "system": "wheelset",
         "wheelset": {"override": {name: float(value) for name, value in override.items()}},
-        "contact": {"law": law} | ({"cells": int(rng.integers(5, 25))} if law == "fastsim" else {}),
+        "contact": {"law": law} | ({"cells": int(generator.integers(5, 25))} if law == "fastsim" else {}),
         "speeds": {"values": [speed]},
-        "run": {"displacement": float(rng.uniform(5e-4, 7e-3)), "speeds": [speed], "step": 1e-4, "duration": 1e-4},
+        "run": {
+            "displacement": float(generator.uniform(5e-4, 7e-3)),
+            "speeds": [speed],
+            "step": 1e-4,
+            "duration": 1e-4,
+        },
     }
     table |= {"profiles": {}} if profiled else {}
     equations = equations_of(build(table), "reference", speed)
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
-    duration = float(rng.uniform(0.3, 2.0))
-    steps = math.ceil(duration * fastest / (LONGEST_STEP_FACTOR * rng.uniform(0.1, 1.0)))
+    duration = float(generator.uniform(0.3, 2.0))
+    steps = math.ceil(duration * fastest / (LONGEST_STEP_FACTOR * generator.uniform(0.1, 1.0)))
     table["run"] |= {"step": duration / steps, "duration": duration}
-    return build(table), str(rng.choice(ENGINES)), speed
+    return build(table), str(generator.choice(ENGINES)), speed
 
 
 def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:

@@ -62,14 +62,14 @@ class PricedWheelset(MeshedScene):
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
-def _exact_path(equations: Equations, start: np.ndarray, step: float, duration: float) -> WheelsetPath:
+def _exact_path(equations: Equations, start_state: np.ndarray, step: float, duration: float) -> WheelsetPath:
     """A path by a Runge-Kutta method of order 8 that picks its own steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
-    scale = np.maximum(np.abs(start), 1e-3)
+    scale = np.maximum(np.abs(start_state), 1e-3)
     solved = solve_ivp(
         lambda t, y: equations.rates(y),
         (0.0, duration),
-        start,
+        start_state,
         "DOP853",
         np.minimum(times, duration),
         rtol=OTHER_TOLERANCE,

@@ -20,24 +20,24 @@ def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
 
 
 def _of_sensor(
-    kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
+    signal_kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
 ) -> Entry:
     """An effect of the sensors at a port: present where keys of [port.signals] or [port.pressures] differ from those of
     a perfect sensor.
     """
 
     def is_present(scene: Any) -> bool:
-        return scene.port is not None and _differs_from_default(getattr(scene.port, kind), keys)
+        return scene.port is not None and _differs_from_default(getattr(scene.port, signal_kind), keys)
 
     def leave_out(table: Table, scene: Any) -> None:
         for key in (*keys, *(("seed",) if keys == NOISE_KEYS else ())):
-            table["port"][kind].pop(key, None)
+            table["port"][signal_kind].pop(key, None)
 
     def put_in(table: Table, scene: Any) -> None:
-        table.setdefault("port", {}).setdefault(kind, {}).update(usual_value)
+        table.setdefault("port", {}).setdefault(signal_kind, {}).update(usual_value)
 
     counts = {"asked": 1, count_name: 4}
-    key_path = f"port.{kind}.{keys[0]}"
+    key_path = f"port.{signal_kind}.{keys[0]}"
     return Entry(description, key_path, cost, counts, ("port",), there=is_present, leave_out=leave_out, put_in=put_in)
 
 

@@ -61,15 +61,16 @@ class Parameters(Strict):
         return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
 
 
-def channels_of_sensors(p: Parameters) -> list[tuple[str, ...]]:
+def channels_of_sensors(parameters: Parameters) -> list[tuple[str, ...]]:
     """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
-    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
+    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(parameters.sensors))]
 
 
-def readings_of(result: Result, p: Parameters) -> np.ndarray:
+def readings_of(result: Result, parameters: Parameters) -> np.ndarray:
     """Readings (n, sensors, 3) in m/s^2 of the accelerometers, from a run's result."""
     return np.stack(
-        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(p)], axis=1
+        [np.column_stack([result[channel] for channel in channels]) for channels in channels_of_sensors(parameters)],
+        axis=1,
     )
 
 

@@ -56,7 +56,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def _doubts_about_forces(
-    assembly: Assembly, p: Parameters, values: np.ndarray, sample_period: float
+    assembly: Assembly, parameters: Parameters, values: np.ndarray, sample_period: float
 ) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
     """Doubts about wheel forces (n, 2) in N that do not suit this vehicle, and assumptions that they carry its weight;
     InputError for impossible forces.
@@ -65,7 +65,8 @@ def _doubts_about_forces(
     from models.measured.signal import Signal
 
     front, rear = (
-        Signal(axle, p.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
+        Signal(axle, parameters.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0)
+        for axle in ("front", "rear")
     )
     scene = assembly.scene
     axles = AxleForces(
@@ -79,20 +80,22 @@ def _doubts_about_forces(
         turn=assembly.mode == "force-body",
     )
     looked = (*check(axles), *_samples((front, rear), values, sample_period))
-    findings = tuple(finding for finding in looked if finding.weight != "note" and finding.check not in p.accept)
+    findings = tuple(
+        finding for finding in looked if finding.weight != "note" and finding.check not in parameters.accept
+    )
     errors = [finding for finding in findings if finding.weight == "error"]
     if errors:
         names = ", ".join(f'"{name}"' for name in dict.fromkeys(finding.check for finding in errors))
         raise InputError(
             scene.file,
             "effects.wheel_forces.file",
-            p.file,
+            parameters.file,
             f"{' '.join(finding.text for finding in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(finding.text for finding in findings), _balance_assumptions(axles, p)
+    return tuple(finding.text for finding in findings), _balance_assumptions(axles, parameters)
 
 
-def _balance_assumptions(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
+def _balance_assumptions(axles: "AxleForces", parameters: Parameters) -> tuple[Assumption, ...]:
     """Assumptions that the mean forces carry the vehicle's weight and each axle's, as far as the record can tell."""
     from models.measured.axle_balance import equilibrium_residual
 
@@ -113,7 +116,7 @@ def _balance_assumptions(axles: "AxleForces", p: Parameters) -> tuple[Assumption
             float(means.known[i]),
         )
         for i, (name, says, unit, symbols) in enumerate(balance_rows)
-        if name not in p.accept and axles.parameters.g > 0
+        if name not in parameters.accept and axles.parameters.g > 0
     )
 
 

@@ -24,10 +24,10 @@ def _of_parameters(
         excluded = "profiles" in entry_fields.get("excludes", ()) and wheelset.profiles is not None
         return not excluded and any(getattr(wheelset, key) > 0.0 for key in keys)
 
-    def overriding(value: Callable[[str], float]) -> Callable[[Table, Any], None]:
+    def overriding(value_of: Callable[[str], float]) -> Callable[[Table, Any], None]:
         def change(table: Table, scene: Any) -> None:
             override = table.setdefault("wheelset", {}).setdefault("override", {})
-            override.update({key: value(key) for key in keys})
+            override.update({key: value_of(key) for key in keys})
 
         return change
 
