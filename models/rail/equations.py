@@ -54,7 +54,7 @@ DIFFERENCE_STEPS = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-
 """Steps of the differences that linearise: small against penetration (7e-5 m) and creepage."""
 LARGEST_SPEED = 200.0
 """m/s"""
-LIMIT = 0.3
+DERAILED_LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
 DEEPEST_POSITION = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
@@ -197,7 +197,7 @@ def _march_with_arrays(state, parameters, steps, path, reports, workspace, stage
                 return i
         for k in range(STATE_COUNT):
             state[k] += step / 6.0 * total[k]
-        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < LIMIT:
+        if not abs(state[Y]) + abs(state[YAW]) + abs(state[ROLL]) + abs(state[Z]) < DERAILED_LIMIT:
             return i
     return count
 

@@ -15,7 +15,20 @@ from models.contact.inputs import Array
 from models.machine.compiled import inlined, njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond
-from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATE_COUNT, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
+from models.rail.equations import (
+    ANGLE,
+    DERAILED_LIMIT,
+    ROLL,
+    ROLL_RATE,
+    SPIN,
+    STATE_COUNT,
+    Y_RATE,
+    YAW,
+    YAW_RATE,
+    Z_RATE,
+    Y,
+    Z,
+)
 from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
 from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
 
@@ -99,7 +112,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
     joint_forces_view = array(forces_out, (JOINTS,))
-    if not abs(y) + abs(z) + abs(yaw) + abs(roll) < LIMIT:
+    if not abs(y) + abs(z) + abs(yaw) + abs(roll) < DERAILED_LIMIT:
         joint_forces_view[:] = np.nan
         return
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)

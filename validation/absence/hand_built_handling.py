@@ -27,8 +27,8 @@ from models.multibody.tree import cross, dot, plus, three, times
 from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, net, shape_factor
 from models.vehicles.free_vehicle import SPECK
 
-SIZE, CELLS = 23, 21
-HEAD, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
+COORDINATE_COUNT, CELLS = 23, 21
+HEAD_LENGTH, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
 """Numbers in the table that ``numbers_of`` writes."""
 TOUCH = size_of(CONTACT)
 
@@ -38,8 +38,13 @@ def add_car_forces(table, t, q, v, forces_out):
     """Add the generalised forces of the hand-written car to ``forces_out`` (23,). All arguments but the time are
     pointers to doubles: the parameter table, coordinates, rates and forces.
     """
-    head, q, v, forces_out = array(table, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(forces_out, (SIZE,))
-    wheels, mounts = beyond(table, HEAD), beyond(table, HEAD + 4 * WHEEL)
+    head, q, v, forces_out = (
+        array(table, (HEAD_LENGTH,)),
+        array(q, (COORDINATE_COUNT,)),
+        array(v, (COORDINATE_COUNT,)),
+        array(forces_out, (COORDINATE_COUNT,)),
+    )
+    wheels, mounts = beyond(table, HEAD_LENGTH), beyond(table, HEAD_LENGTH + 4 * WHEEL)
     cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
     c_yaw, s_yaw, c_roll, s_roll = math.cos(q[2]), math.sin(q[2]), math.cos(q[4]), math.sin(q[4])
     c_pitch, s_pitch = math.cos(q[5]), math.sin(q[5])
@@ -289,7 +294,7 @@ def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: in
     def marched() -> np.ndarray:
         with installed(callback):
             path, _ = rollout.rollout(built, data, state[None, :], nstep=steps)
-        return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * SIZE]])
+        return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * COORDINATE_COUNT]])
 
     return marched
 

@@ -18,7 +18,7 @@ from models.rail.profile_contact import Pose, normal_force_and_axes
 from models.rail.wheel_forces import REPORT, rails_of
 
 STATES = 10
-SIZE = size_of(REPORT)
+REPORT_LENGTH = size_of(REPORT)
 
 
 @lean
@@ -77,7 +77,7 @@ def rates(state, speed, p, fills_report, state_rate, report):
                 -load * (n_y * vy + n_z * vz),
                 0.0,
             )
-            for k in range(SIZE):
+            for k in range(REPORT_LENGTH):
                 report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
@@ -121,7 +121,7 @@ def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int)
     p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *rails_of(w).wheels[0].tolist()[:7])
 
     def marched() -> tuple[np.ndarray, np.ndarray]:
-        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, SIZE))
+        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, REPORT_LENGTH))
         march(state, speed, step, p, path, reports)
         return path, reports.view(REPORT)[..., 0]
 

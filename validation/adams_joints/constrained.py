@@ -13,7 +13,7 @@ from models.core.runge_kutta import step_on
 from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, about_marker
 
-PLACE, TURN, VELOCITY, TURNING, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
+POSITION, QUATERNION, VELOCITY, ANGULAR_VELOCITY, ANGLE = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), 13
 """Of a state (14,): centre, quaternion (scalar last), velocity, angular velocity, angle about the joint's axis."""
 START_VELOCITY_TOLERANCE = 1e-9
 """m/s, rad/s: start velocities that no joint allows."""
@@ -39,7 +39,7 @@ class ConstrainedBody:
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Rates (14,) of a state."""
-        quaternion, turning = state[TURN], state[TURNING]
+        quaternion, turning = state[QUATERNION], state[ANGULAR_VELOCITY]
         x, y, z, w = quaternion
         product = np.array(  # of the angular velocity and the quaternion
             [
@@ -56,9 +56,9 @@ class ConstrainedBody:
     def accelerations_and_reaction(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular accelerations (6,) of the body's centre, and the joint's force and moment (6,) about the
         centre."""
-        m, rotation = self.mechanism, _rotation_matrix(state[TURN])
+        m, rotation = self.mechanism, _rotation_matrix(state[QUATERNION])
         inertia = rotation @ m.inertia @ rotation.T
-        turning = state[TURNING]
+        turning = state[ANGULAR_VELOCITY]
         applied = self.springs(state)
         applied[:3] += m.mass * m.gravity
         applied[3:] -= _vector_product(turning, inertia @ turning)
@@ -72,27 +72,27 @@ class ConstrainedBody:
 
     def springs(self, state: np.ndarray) -> np.ndarray:
         """Force and moment (6,) of all springs on the body about its centre."""
-        wrench, rotation = np.zeros(6), _rotation_matrix(state[TURN])
+        wrench, rotation = np.zeros(6), _rotation_matrix(state[QUATERNION])
         for spring in self.mechanism.springs:
             if spring.turns:
                 law = spring.stiffness * (state[ANGLE] - spring.free_length)
-                law += spring.damping * (self.joint_axes[2] @ state[TURNING])
+                law += spring.damping * (self.joint_axes[2] @ state[ANGULAR_VELOCITY])
                 wrench[3:] -= law * self.joint_axes[2]
                 continue
             arm = rotation @ (spring.body - self.mechanism.centre)
-            offset = state[PLACE] + arm - spring.ground
+            offset = state[POSITION] + arm - spring.ground
             length = np.linalg.norm(offset)
             if length > 0.0:
                 direction = offset / length
-                speed = direction @ (state[VELOCITY] + _vector_product(state[TURNING], arm))
+                speed = direction @ (state[VELOCITY] + _vector_product(state[ANGULAR_VELOCITY], arm))
                 force = -(spring.stiffness * (length - spring.free_length) + spring.damping * speed) * direction
                 wrench += np.concatenate([force, _vector_product(arm, force)])
         return wrench
 
     def _constraints(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix (c, 6) of the joint's constraints on the accelerations, and its right-hand side (c,)."""
-        kind, turning = self.mechanism.kind, state[TURNING]
-        rotation = _rotation_matrix(state[TURN])
+        kind, turning = self.mechanism.kind, state[ANGULAR_VELOCITY]
+        rotation = _rotation_matrix(state[QUATERNION])
         arm = rotation @ self.arm
         point = np.hstack([np.eye(3), -_skew_matrix(arm)])
         bent = -_vector_product(turning, _vector_product(turning, arm))
@@ -112,7 +112,7 @@ class ConstrainedBody:
             swing = -axes[2] @ _vector_product(turning, _vector_product(turning, on_body))
             return np.vstack([point, row]), np.append(bent, swing)
         if kind == "distance":
-            offset = state[PLACE] + arm - self.mechanism.ground.place
+            offset = state[POSITION] + arm - self.mechanism.ground.place
             speed = state[VELOCITY] + _vector_product(turning, arm)
             return (offset @ point)[None], np.array([offset @ bent - speed @ speed])
         return np.empty((0, 6)), np.empty(0)
@@ -139,7 +139,7 @@ class ConstrainedBody:
 
     def _after_step(self, state: np.ndarray, step: float) -> np.ndarray:
         next_state = step_on(lambda _, stage_state: self.rates(stage_state), 0.0, state, step)
-        next_state[TURN] /= np.linalg.norm(next_state[TURN])
+        next_state[QUATERNION] /= np.linalg.norm(next_state[QUATERNION])
         return next_state
 
     def _motion_and_reaction(self, states: np.ndarray, spacing: float) -> tuple[BodyMotion, Reaction]:
@@ -148,11 +148,11 @@ class ConstrainedBody:
         wrenches = np.array([wrench + self.springs(state) for (_, wrench), state in zip(solved, states, strict=True)])
         motion = BodyMotion(
             spacing * np.arange(len(states)),
-            states[:, PLACE],
+            states[:, POSITION],
             states[:, VELOCITY],
             accelerations[:, :3],
-            np.array([_rotation_matrix(state[TURN]) for state in states]),
-            states[:, TURNING],
+            np.array([_rotation_matrix(state[QUATERNION]) for state in states]),
+            states[:, ANGULAR_VELOCITY],
             accelerations[:, 3:],
         )
         return motion, about_marker(self.mechanism, motion, wrenches[:, :3], wrenches[:, 3:])

@@ -16,8 +16,8 @@ from models.vehicles.free_vehicle import anchor, joints
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
-HEAD, PER_SPRING = 2, 10
-COORDINATE, STIFFNESS, DAMPING, REST, GROUND, ARM = 0, 1, 2, 3, 4, 7
+HEAD_LENGTH, PER_SPRING = 2, 10
+COORDINATE, STIFFNESS, DAMPING, FREE_LENGTH, GROUND, ARM = 0, 1, 2, 3, 4, 7
 """Of a spring: the coordinate that it turns (-1: it lies between two points), N/m, N s/m, m, place of its point on the
 ground, and that on the body from the last joint (m)."""
 _NONE = (0.0, 0.0, 0.0)
@@ -47,12 +47,12 @@ def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
 @compiled
 def spring_forces(table, t, q, v, force_sum):
     """Add the springs' forces (N, N m) to ``force_sum`` (n,), at coordinates and rates (n,)."""
-    head = array(table, (HEAD,))
+    head = array(table, (HEAD_LENGTH,))
     n, count = int(head[0]), int(head[1])
     if count == 0:
         return
-    chain = array(beyond(table, HEAD), (n, PER_JOINT))
-    springs = array(beyond(table, HEAD + n * PER_JOINT), (count, PER_SPRING))
+    chain = array(beyond(table, HEAD_LENGTH), (n, PER_JOINT))
+    springs = array(beyond(table, HEAD_LENGTH + n * PER_JOINT), (count, PER_SPRING))
     joint_positions, rate, force_view = array(q, (n,)), array(v, (n,)), array(force_sum, (n,))
     m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
     move(chain, joint_positions, rate, m)
@@ -60,7 +60,7 @@ def spring_forces(table, t, q, v, force_sum):
         law = springs[i]
         j = int(law[COORDINATE])
         if j >= 0:
-            force_view[j] -= law[STIFFNESS] * (joint_positions[j] - law[REST]) + law[DAMPING] * rate[j]
+            force_view[j] -= law[STIFFNESS] * (joint_positions[j] - law[FREE_LENGTH]) + law[DAMPING] * rate[j]
             continue
         tip = locate(m[n], springs[i], ARM)
         offset = plus(tip, times(three(law, GROUND), -1.0))
@@ -70,7 +70,7 @@ def spring_forces(table, t, q, v, force_sum):
         direction, speed = times(offset, 1.0 / length), 0.0
         for k in range(n):
             speed += dot(direction, column(chain[k, TURNS], m[k + 1], tip)) * rate[k]
-        push = -law[STIFFNESS] * (length - law[REST]) - law[DAMPING] * speed
+        push = -law[STIFFNESS] * (length - law[FREE_LENGTH]) - law[DAMPING] * speed
         add_wrench(chain, m, n - 1, tip, times(direction, push), _NONE, force_view)
 
 

@@ -26,7 +26,7 @@ TITLE = "Joints and springs of another multibody code"
 SYSTEM: System = "rolling-vehicle"
 FOLDER = "adams_joints"
 FAMILIES = ("Revolute", "Prismatic", "Cylindrical", "Spherical", "Universal", "Distance", "RotSpring", "TranSpring")
-QUICK = ("Revolute", "Distance")
+QUICK_FAMILIES = ("Revolute", "Distance")
 MODELS = {"TranSpring": "TransSpring"}
 """Families whose model file has another name."""
 ENGINES = ("exudyn", "mujoco")
@@ -42,7 +42,7 @@ TWINS = 1e-6
 """Of engines and reference, m and share: steps of 5 ms leave 3e-7 of both."""
 LOSES = 1e-4
 """Share of the largest kinetic energy that a file's own motion may lose without friction."""
-WINDOW = 10
+WINDOW_ROWS = 10
 """Rows of a file, a tenth of a second, after which a march from its own state is compared."""
 SHARED_FILES = {"Spherical": 0.0, "Universal": 90.0}
 """Families whose file is of the pendulum of Revolute's, and by how many degrees about z it is turned from that."""
@@ -55,7 +55,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data = data_folder()
     rows: list[Row] = []
     saved: dict[str, Any] = {}
-    for family in QUICK if quick else FAMILIES:
+    for family in QUICK_FAMILIES if quick else FAMILIES:
         model = None if data is None else data / FOLDER / f"{MODELS.get(family, family)}_Case01.adm"
         if model is None or not model.is_file():
             reason = "TWINRIG_DATA names no folder with the other code's models"
@@ -232,17 +232,17 @@ def _windows(family: str, mechanism: Mechanism, output: OutputFile, duration: fl
     What energy the file loses meanwhile, dE, changes its speed by dE / (m v), and its place by that for this time.
     """
     body, theirs = ConstrainedBody(mechanism), output.motion(mechanism)
-    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW, WINDOW)
-    ends = [body.marched(body.at_motion(theirs, k), WINDOW * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
-    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW]
-    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW]) - digits).max(axis=1)
+    starts = np.arange(0, round(duration / STEP / STEPS_PER_ROW) - WINDOW_ROWS, WINDOW_ROWS)
+    ends = [body.marched(body.at_motion(theirs, k), WINDOW_ROWS * STEPS_PER_ROW, STEP)[:3] for k in starts.tolist()]
+    digits = output.rounding("Pos")[starts] + output.rounding("Pos")[starts + WINDOW_ROWS]
+    off = (np.abs(np.array(ends) - theirs.place[starts + WINDOW_ROWS]) - digits).max(axis=1)
     _, total_energy = output.energies(mechanism)
     speed = np.linalg.norm(theirs.velocity, axis=1)
-    fastest = np.maximum(speed[starts], speed[starts + WINDOW])
+    fastest = np.maximum(speed[starts], speed[starts + WINDOW_ROWS])
     lost = (
-        np.abs(total_energy[starts + WINDOW] - total_energy[starts])
+        np.abs(total_energy[starts + WINDOW_ROWS] - total_energy[starts])
         / (mechanism.mass * fastest)
-        * (WINDOW * STEPS_PER_ROW * STEP)
+        * (WINDOW_ROWS * STEPS_PER_ROW * STEP)
     )
     why = "from state to state of the file, less its digits and what its loss of energy explains; the bound asked for"
     quantity = f"{family}: position 0.1 s after each of the file's own states, reference"

@@ -26,7 +26,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
 SEED = 22
-LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
+LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 WIDE_BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
 PHASES = {
     "deep": FivePhase(1, e1=40.0, e2=60.0, e3=40.0, e4=10.0, e5=150.0, falling=60.0, fast=20.0, slow=15.0),
@@ -149,7 +149,9 @@ def _supply_row() -> Row:
 
 
 def _frozen(inertia: float = FRONT_WHEEL.spin_inertia) -> WheelAtSpeed:
-    return WheelAtSpeed(11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINE, table_of_surface("dry"))
+    return WheelAtSpeed(
+        11.11, FRONT_WHEEL.mass * GRAVITY, FRONT_WHEEL.radius, inertia, LINEAR_BRAKE, table_of_surface("dry")
+    )
 
 
 def _cycle_rows(name: str) -> list[Row]:

@@ -32,7 +32,7 @@ STOPS = {True: 3, False: 200}
 """Random stops, by ``quick``."""
 LIMITS = ("rolls over", "pitches over", "jackknifes", "turns over")
 """Ends by a limit of the vehicle, which a legal scene may meet."""
-LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
+LINEAR_BRAKE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=74.51, fast=42.29, slow=6.42)
 """Phases that a fast first application leaves with a release that does not end by the wheel's acceleration."""
 
@@ -150,7 +150,7 @@ def _slow_apply_row() -> Row:
     chambers = Chambers(np.full(1, 0.15), np.full(1, 0.1), 8.0, slow=np.full(1, 1.2))
     air, torques = resting_chambers(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
-        by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINE), torques)
+        by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINEAR_BRAKE), torques)
     return Observed(
         "braking_limits.slow_apply",
         SYSTEM,
@@ -163,7 +163,7 @@ def _slow_apply_row() -> Row:
 def _cycle_row() -> Row:
     """Row: limit cycle of the controller after a fast first application to a rolling wheel, compared with the exact
     cycle after a slow one."""
-    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINE, table_of_surface("snow"))
+    frozen = WheelAtSpeed(20.0, 16900.0, 0.5, 13.35, LINEAR_BRAKE, table_of_surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
     return Observed(

@@ -72,7 +72,7 @@ CLASSES = {
 """The same of a class: its name, and what it does."""
 ROUND = 100
 """Exchanges of a round."""
-QUICK = ("NaN", "too few wheels", "silence", "died")
+QUICK_FAULTS = ("NaN", "too few wheels", "silence", "died")
 
 
 @allowing_breaches("both sides are cut off after the same few samples", "stop")
@@ -91,7 +91,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         ).beside("", f"median of rounds of {ROUND} in which all ways have their turn", "none")
         for name, (cost, low, high) in costs.items()
     ]
-    told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
+    told = [_process(kind, folder) for kind in (QUICK_FAULTS if quick else FAULTS)]
     told += [_class(kind, folder) for kind in (("catches everything",) if quick else CLASSES)]
     told += [] if quick else [_slave(kind, folder) for kind in SLAVES]
     return rows + [row for way_name in told for row in _fault_rows(way_name)], {"costs": costs, "faults": told}

@@ -33,7 +33,7 @@ HEADLINE = {
     "dry, light": ("dry", 0.004, 22.22),
 }
 """Surface, slip that settles, speed (m/s)."""
-FURTHER = {
+FURTHER_CASES = {
     "snow": ("snow", 0.04, 13.9, 1.0, 1.0),
     "snow, light": ("snow", 0.004, 13.9, 1.0, 1.0),
     "wet": ("wet", 0.05, 22.22, 1.0, 1.0),
@@ -46,7 +46,7 @@ FURTHER = {
     "heavy wheel": ("wet", 0.03, 11.11, 1.0, 4.0),
 }
 """The same with factors of mass and spin inertia."""
-BOUND = 5e-4
+DISTANCE_BOUND = 5e-4
 STEPS = {True: (PAPER_STEP, 2e-2), False: (1e-4, 5e-4, 1e-3, 2e-3, PAPER_STEP, 1e-2, 2e-2)}
 """Steps (s) of the sweep, by ``quick``."""
 FINE_STEP = 5e-4
@@ -68,7 +68,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     curves = {name: _curve(*headline_arguments, steps) for name, headline_arguments in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER.items()]
+        rows += [_further_row(name, *headline_arguments) for name, headline_arguments in FURTHER_CASES.items()]
     rows += [
         _sweep_row(
             ("ice", "dry") if quick else tuple(NAMED_SURFACES),
@@ -119,7 +119,7 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
             f"relative error of the stopping distance of a wheel that rolls first, {name}, steps of 5.5 ms",
             ours,
             "",
-        ).at_most(BOUND, why, "closed form"),
+        ).at_most(DISTANCE_BOUND, why, "closed form"),
         Observed(
             f"{key}.steady",
             SYSTEM,
@@ -160,7 +160,7 @@ def _further_row(name: str, surface: str, slip: float, speed: float, mass: float
         "m/s), steps of 5.5 ms",
         error,
         "",
-    ).at_most(BOUND, "as the four above", "closed form")
+    ).at_most(DISTANCE_BOUND, "as the four above", "closed form")
 
 
 def faults_of(stopped: QuarterStop, radius: float, brakes: bool) -> list[str]:
@@ -290,14 +290,14 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
             ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
             ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
-        ax.axhline(100.0 * BOUND, color=GREY, linewidth=0.8)
+        ax.axhline(100.0 * DISTANCE_BOUND, color=GREY, linewidth=0.8)
         ax.axvline(1e3 * PAPER_STEP, color=GREY, linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
         ax.label_outer()
     add_heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
     legend_below(figure, axes.flat[0])
     caption = (
-        f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
+        f"Error of the stopping distance over the step; grey: the bound of {100 * DISTANCE_BOUND:g} % and the paper's "
         "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there."
     )
     return [(caption, figure)]

@@ -22,7 +22,7 @@ QUICK_DURATION, FULL_DURATION = 0.05, 1.0
 STATICS = 1e-3
 """Of the closed form of a caravan that brakes alone, which knows no lean: pitched by 2.7 mrad its centre of mass, half
 a metre above the ball, comes ahead by 5e-4 of its arm."""
-WHY = "another algorithm in plain code; they differ by rounding"
+ROUNDING_REASON = "another algorithm in plain code; they differ by rounding"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -65,7 +65,7 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         "any heading",
         whole.relative_difference(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
-    ).at_most(1e-12, WHY, "native")
+    ).at_most(1e-12, ROUNDING_REASON, "native")
 
 
 def _stop_row(vehicle: str, engine: str, duration: float) -> Row:

@@ -31,7 +31,7 @@ NOISY_RIDE, FINE_TOLERANCE = 4, 0.005
 """A ride, and a tolerance for which its copies are too few if they are the fewest."""
 RESAMPLED, UNSURE = 4000, 0.0015
 """Of copies, to tell what they are sure of: this quantile is left below."""
-QUICK = (0, 2, 3)
+QUICK_SCENES = (0, 2, 3)
 """Scenes of the pitch plane alone in the quick share, by both implementations."""
 JUDGED_CHANGES = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
@@ -70,7 +70,7 @@ def _least_certain_change(full_mean_squares: np.ndarray, reduced: np.ndarray) ->
 @allowing_breaches("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
-    seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
+    seeds = {"pitch-plane": QUICK_SCENES} if quick else {system: range(count) for system, count in COUNTS.items()}
     choices = [judged(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
     rows = [
         *_row_of_kept_tolerances(choices),

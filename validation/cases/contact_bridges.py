@@ -39,12 +39,12 @@ COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
 ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
+THEORY_NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
-ROUNDS, FIGURE_ROUNDS = 48, 6
+TIMING_ROUNDS, FIGURE_ROUNDS = 48, 6
 """Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
 SHORTEST_TURN = 0.001
-WHY = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
+TIMING_NOTE = "median of the ratios within interleaved rounds, seconds of the processor; start of a run taken out"
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Setup:
         if self.law is None:
             return "no contact" if self.bridge == "none" else "empty callback"
         theory, cells = self.law
-        return f"FASTSIM, {cells} cells" if theory == "fastsim" else NAMES[theory]
+        return f"FASTSIM, {cells} cells" if theory == "fastsim" else THEORY_NAMES[theory]
 
     @property
     def told(self) -> bool:
@@ -93,7 +93,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return rows, data
     setups = every()
     listed_setups = [setup for setup in setups if setup.told]
-    rows += _price_rows(Prices([*listed_setups, *(setup.without for setup in listed_setups)], ROUNDS))
+    rows += _price_rows(Prices([*listed_setups, *(setup.without for setup in listed_setups)], TIMING_ROUNDS))
     shown = Prices(setups, FIGURE_ROUNDS)
     return rows, {**data, "points": [shown.point(setup) for setup in setups]}
 
@@ -250,7 +250,7 @@ def _price_rows(prices: Prices) -> list[Row]:
             f"{ENGINE_NAMES[setup.engine]}, {setup.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
             f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
-        rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, WHY))
+        rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, TIMING_NOTE))
     return rows
 
 
@@ -300,7 +300,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
         "start of a run taken out. Kernel: the forces of all wheels in a compiled loop, times the calls per step. "
         "Bridge: what the step takes beyond the engine's own and the kernel, for plain Python its slower kernel "
         "too. Share: of the bridge in the step, median of the rounds with its 95 % interval. Rows time what they "
-        f"tell by itself, in {ROUNDS} rounds; here are {FIGURE_ROUNDS} of all."
+        f"tell by itself, in {TIMING_ROUNDS} rounds; here are {FIGURE_ROUNDS} of all."
     )
     heads = ("engine", "method", "wheels", "bridge", "law", "step", "engine's own", "kernel", "bridge's", "share [%]")
     rows = tuple(

@@ -15,17 +15,17 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
 DIGITS = 60
-BOUND = 1e-10
+RELATIVE_BOUND = 1e-10
 LOAD = 1e5
 PRESSURE, SHORT_SEMI_AXIS = Decimal(10) ** 9, Decimal(1) / 1000
 """Largest pressure (Pa) and short semi-axis (m) of the contacts compared."""
-PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
+MATERIAL_PAIR = MaterialPair(STEEL, Material(E=7e10, nu=0.33))
 """Steel on aluminium: the combined modulus is exact for any two materials as long as there is no friction."""
 NEAR_CIRCLE = tuple(1.0 - 10.0**-k for k in range(1, 16))
-RANGE = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
+AXIS_RATIOS = tuple(float(g) for g in 10.0 ** np.linspace(-6, 0, 49))
 """Ratios of axes: 1e-4 and a curvature ratio of 1e-4 are inside."""
-NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
-WHY = (
+QUANTITY_NAMES = {"long": "longer semi-axis", "short": "shorter semi-axis", "p0": "largest pressure"}
+BOUND_REASON = (
     "K and E by the arithmetic-geometric mean in 60 decimal digits, which leaves 30 where K - E cancels: no digit "
     "and no integral shared with the code"
 )
@@ -35,24 +35,24 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for axes, pressure, approach and load over all ratios of axes, for one published contact, for refusals;
     the same in quick.
     """
-    errors = _errors((*RANGE, *NEAR_CIRCLE))
+    errors = _errors((*AXIS_RATIOS, *NEAR_CIRCLE))
     rows = [
         Observed(
             f"contact_hertz.{name}",
             SYSTEM,
-            f"largest relative error of {NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
+            f"largest relative error of {QUANTITY_NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
             max(worst),
             "",
-        ).at_most(BOUND, WHY, "closed form")
+        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
         for name, worst in errors.items()
     ]
-    return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
+    return rows + _published() + _behaviour(), {"ratio": [*AXIS_RATIOS, *NEAR_CIRCLE], "errors": errors}
 
 
 def ellipse(ratio: float) -> dict[str, Decimal]:
     """Exact curvatures, load and approach (many digits) of a contact with a ratio of short to long semi-axis."""
     with localcontext(prec=DIGITS):
-        g, modulus = Decimal(ratio), Decimal(PAIR.modulus)
+        g, modulus = Decimal(ratio), Decimal(MATERIAL_PAIR.modulus)
         k, e = _complete(g)
         if ratio == 1.0:
             flat = steep = _pi() * PRESSURE / (4 * SHORT_SEMI_AXIS * modulus)
@@ -97,10 +97,10 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
         np.array([float(computed[name]) for computed in truth]) for name in ("flat", "steep", "load", "approach")
     )
     touching = [
-        by_load(flat, steep, load, PAIR),
-        by_approach(flat, steep, approach, PAIR),
-        _exchange_axes(by_load(steep, flat, load, PAIR)),
-        _exchange_axes(by_approach(steep, flat, approach, PAIR)),
+        by_load(flat, steep, load, MATERIAL_PAIR),
+        by_approach(flat, steep, approach, MATERIAL_PAIR),
+        _exchange_axes(by_load(steep, flat, load, MATERIAL_PAIR)),
+        _exchange_axes(by_approach(steep, flat, approach, MATERIAL_PAIR)),
     ]
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
@@ -148,7 +148,9 @@ def _published() -> list[Row]:
 
 def _behaviour() -> list[Row]:
     """Rows: zero and negative loads give zero, and input that is no Hertzian contact is refused."""
-    nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
+    nothing = [by_load(1.0, 2.0, load, MATERIAL_PAIR) for load in (0.0, -1.0, -1e6)] + [
+        by_approach(1.0, 2.0, -1e-3, MATERIAL_PAIR)
+    ]
     exact = all(
         value == 0.0
         for nothing_solved in nothing
@@ -162,14 +164,14 @@ def _behaviour() -> list[Row]:
     )
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
-        "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR),
-        "concave": lambda: by_load(1.0, -0.1, LOAD, PAIR),
-        "not finite": lambda: by_load(1.0, np.nan, LOAD, PAIR),
-        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, PAIR),
+        "flat": lambda: by_load(0.0, 1.0, LOAD, MATERIAL_PAIR),
+        "concave": lambda: by_load(1.0, -0.1, LOAD, MATERIAL_PAIR),
+        "not finite": lambda: by_load(1.0, np.nan, LOAD, MATERIAL_PAIR),
+        "radius in mm": lambda: by_load(1 / 920, 1 / 600, LOAD, MATERIAL_PAIR),
         "modulus in MPa": lambda: Material(E=2.1e5, nu=0.28),
-        "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, PAIR),
-        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, PAIR),
-        "friction of steel on aluminium": PAIR.require_likeness,
+        "approach in mm": lambda: by_approach(1.0, 1.0, 0.1, MATERIAL_PAIR),
+        "shapes": lambda: by_load([1.0, 2.0], [1.0, 2.0, 3.0], LOAD, MATERIAL_PAIR),
+        "friction of steel on aluminium": MATERIAL_PAIR.require_likeness,
     }
     rows = [
         behaviour_row(
@@ -237,8 +239,10 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
     left.legend()
     ratio = np.array(case_data["ratio"])
     for name, errors in case_data["errors"].items():
-        right.loglog(ratio[: len(RANGE)], np.maximum(errors[: len(RANGE)], 1e-17), ".", markersize=4, label=name)
-    right.axhline(BOUND, color="black", linestyle=":", label="allowed")
+        right.loglog(
+            ratio[: len(AXIS_RATIOS)], np.maximum(errors[: len(AXIS_RATIOS)], 1e-17), ".", markersize=4, label=name
+        )
+    right.axhline(RELATIVE_BOUND, color="black", linestyle=":", label="allowed")
     right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))
     right.legend(loc="center", ncols=3)
     add_heading(figure, "Hertzian contact loses no digits from a thin line to the circle")

@@ -20,7 +20,15 @@ from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import ContactCase, with_exact_forces
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import FASTSIM_BANDS, HELD_SHARE, ROUNDING, kept_shares, theory_errors
-from validation.contact.contact_set import AXIS_RATIOS, JUDGED_PART, PAIR, POISSON, read_contacts, read_drawn, read_wide
+from validation.contact.contact_set import (
+    AXIS_RATIOS,
+    JUDGED_PART,
+    MATERIAL_PAIR,
+    POISSON,
+    read_contacts,
+    read_drawn,
+    read_wide,
+)
 from validation.contact.programs import compare, table
 
 TITLE = "Stated errors of rolling contact"
@@ -227,7 +235,7 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    answers = answer_table(path, out, partial(Built, PAIR), Method())
+    answers = answer_table(path, out, partial(Built, MATERIAL_PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

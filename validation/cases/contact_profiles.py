@@ -28,7 +28,7 @@ QUICK_SHIFTS = np.array([0.0, 4.5, 5.0, 6.0, 6.5])
 LOAD = 1e4
 """Vertical load of a wheel (N): the benchmark has 20 kN on a wheelset."""
 CELLS = 40
-PAIR = MaterialPair()
+MATERIAL_PAIR = MaterialPair()
 BENCHMARK = (
     "Manchester contact benchmark, case A (Shackleton and Iwnicki, Vehicle Syst. Dyn. 46, 2008, 129-149), "
     "S1002 on UIC 60 at 1:40, gauge 1435 mm, back to back 1360 mm, radius 460 mm"
@@ -54,7 +54,7 @@ def _right_wheel_contact(lateral_shift: float, yaw: float, exact: bool) -> dict[
     """Contact of the right wheel at a lateral shift (mm) and yaw (rad): contact points, their loads, and peak
     pressure."""
     touches = wheel_on_rail(s1002(), uic60(), lateral_shift=lateral_shift * 1e-3, yaw=yaw)
-    pressed = press([touch.patch for touch in touches], PAIR, load=LOAD)
+    pressed = press([touch.patch for touch in touches], MATERIAL_PAIR, load=LOAD)
     loads = {id(patch_pressure.patch): patch_pressure.load for patch_pressure in pressed.patches}
     contact_points = [
         {

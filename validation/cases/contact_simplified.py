@@ -20,7 +20,7 @@ from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
-    PAIR,
+    MATERIAL_PAIR,
     Box,
     Shape,
     creepages,
@@ -37,7 +37,7 @@ TITLE = "Rolling contact of any shape: the theory of 1983"
 SYSTEM: System = "contact"
 EXACT_CELLS = 36
 """Cells of the exact grid along each axis."""
-WAYS = {
+FITTING_OPTIONS = {
     "elliptic": PLAIN,
     "paper": PAPER,
     "elliptic, gradient": SimplifiedOptions(fit="gradient"),
@@ -45,7 +45,7 @@ WAYS = {
     "elliptic, one net": replace(PLAIN, separate=False),
 }
 """Ways to use the theory; the first is the default, the second the paper to the letter."""
-ROUNDS = 10
+TIMING_ROUNDS = 10
 """Of timing."""
 NETS = (5, 7, 9, 11, 15, 19, 25)
 HERTZ = (0.05, 0.2, 1.0, 5.0, 20.0)
@@ -72,9 +72,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _hertz(ratio: float, options: SimplifiedOptions) -> dict[str, float]:
     """Relative errors of approach, area and peak pressure on Hertz's ellipse."""
-    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
+    exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, MATERIAL_PAIR)
     a, b = float(exact.a), float(exact.b)
-    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
+    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), MATERIAL_PAIR, load=1e5, options=options)
     return _errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
 
@@ -88,7 +88,7 @@ def largest_jump(patch: Patch, steps: int) -> float:
     until rounding."""
 
     def load(depth: float) -> float:
-        return load_at_depth(patch, depth, PAIR).load
+        return load_at_depth(patch, depth, MATERIAL_PAIR).load
 
     return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, steps + 1).tolist()))
 
@@ -110,8 +110,8 @@ def _against_exact(contact_shape: Shape) -> dict[str, Any]:
     """Errors of every way of fitting, and the exact values. Errors of approach, area and peak are relative; those of
     forces are in % of mu N."""
     contacts = {
-        name: press(contact_shape.distance, PAIR, load=contact_shape.load, options=fitting_options)
-        for name, fitting_options in WAYS.items()
+        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options)
+        for name, fitting_options in FITTING_OPTIONS.items()
     }
     normal = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or _box_around(contacts["elliptic"]))
     motions = creepages(normal.area, contact_shape.load)
@@ -133,9 +133,10 @@ def _approach_of(contact_shape: Shape) -> dict[str, float]:
     """Relative errors of the approach with a grid for each patch, and with one grid for all patches."""
     exact = exact_normal(contact_shape, EXACT_CELLS, contact_shape.box or (0.0, 0.0, 0.0, 0.0)).approach
     return {
-        name: press(contact_shape.distance, PAIR, load=contact_shape.load, options=fitting_options).approach / exact
+        name: press(contact_shape.distance, MATERIAL_PAIR, load=contact_shape.load, options=fitting_options).approach
+        / exact
         - 1.0
-        for name, fitting_options in (("each", PLAIN), ("one", WAYS["elliptic, one net"]))
+        for name, fitting_options in (("each", PLAIN), ("one", FITTING_OPTIONS["elliptic, one net"]))
     }
 
 
@@ -144,7 +145,7 @@ def _errors_on_rails() -> dict[str, dict[str, float]]:
     grid."""
     errors = {}
     for position in placed_wheelsets():
-        pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
+        pressed = press([touch.patch for touch in position.touches], MATERIAL_PAIR, load=position.load)
         along = np.cos(min(patch_pressure.patch.lean for patch_pressure in pressed.patches))
         name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
         name += f"{1e-3 * position.load:g} kN"
@@ -163,18 +164,18 @@ def _box_around(normal_contact: NormalContact) -> Box:
 
 def _times() -> dict[str, list[float]]:
     """Computing times (s) of the functions of both theories at about 45 x 45 cells."""
-    hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, PAIR)
+    hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, MATERIAL_PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
-    contact, (patch,) = press(distance, PAIR, load=1e5), separate(distance)
+    contact, (patch,) = press(distance, MATERIAL_PAIR, load=1e5), separate(distance)
     jobs: dict[str, Callable[[], Any]] = {
-        "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), PAIR, cells=45),
+        "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), MATERIAL_PAIR, cells=45),
         "roll": lambda: roll(contact, FRICTION, *creepage),
-        "press": lambda: press(distance, PAIR, load=1e5),
-        "depth": lambda: load_at_depth(patch, 5e-5, PAIR),
+        "press": lambda: press(distance, MATERIAL_PAIR, load=1e5),
+        "depth": lambda: load_at_depth(patch, 5e-5, MATERIAL_PAIR),
         "exact": lambda: exact_normal(shapes_by_formula()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
     }
-    return dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
+    return dict(zip(jobs, interleave(list(jobs.values()), TIMING_ROUNDS).tolist(), strict=True))
 
 
 def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:

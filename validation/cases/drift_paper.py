@@ -20,7 +20,7 @@ FORCE_NOISE_ALONE = ("options.noise_samples=1", "options.perturbed_models=0")
 """Without the random models and all noise samples but one."""
 RATES = (200.0, 400.0, 1000.0, 2000.0)
 """Sampling rates (Hz) of the full report; the quick one has the study's own alone."""
-QUICK = (*FORCE_NOISE_ALONE, "run.duration=15")
+QUICK_CHANGES = (*FORCE_NOISE_ALONE, "run.duration=15")
 """Of the quick share: a quarter of a minute, in which undisturbed forces do not drift off."""
 
 FIGURES = (
@@ -95,7 +95,7 @@ FIGURES = (
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
-    scene = load(SCENE, QUICK if quick else ())
+    scene = load(SCENE, QUICK_CHANGES if quick else ())
     runs, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
         Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)

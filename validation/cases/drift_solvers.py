@@ -28,7 +28,7 @@ from validation.common.scenes import force_scene, on_paper_road, virtual_drive
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
 SEED = 14
-RATE, DURATION = 50.0, 15.0
+SAMPLING_RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
 SOLVERS = (
     ("reference", "RK4", 1e-3),
@@ -64,7 +64,7 @@ SCHEMES = (("ExplicitEuler", 1, 2.5e-4), ("ExplicitMidpoint", 2, 1e-3), ("RK44",
 """Methods of Exudyn, their order and step (s). What is smoothed before the run goes through the reference's RK4, which
 is Exudyn's RK44 to rounding."""
 PATHS = 20
-WINDOW = (4.0, 8.0)
+GROWTH_WINDOW = (4.0, 8.0)
 """Times (s) between which the growth of the spread is measured: after the start, before the pitch tumbles."""
 SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
@@ -88,7 +88,7 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
     fixed steps.
     """
-    true = virtual_drive(folder, DURATION, 1 / RATE, 2.5e-4)
+    true = virtual_drive(folder, DURATION, 1 / SAMPLING_RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     drifted = []
     tight = solvers[1::2]
@@ -142,14 +142,15 @@ def _record_of_solver(
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
     clean = _run(engine, quiet_assembly, forces.values, cutoff, settings)
-    rows = np.rint(np.array(WINDOW) / step).astype(int)
+    rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
     spread = np.zeros(2)
     for path in range(PATHS):
         noise = NOISE * normal_samples(SEED, path, len(forces.values), 2)
         spread += (_run(engine, quiet_assembly, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet_assembly)
     growth, expected = (
-        float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(WINDOW)[0]) for record_of_run in (spread, law)
+        float(np.log(record_of_run[1] / record_of_run[0]) / np.diff(GROWTH_WINDOW)[0])
+        for record_of_run in (spread, law)
     )
     return {
         "name": name,
@@ -191,8 +192,8 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     forces (n, 2)."""
     p, period = assembly.parameters, 1 / NOISY_RATE
     rates = sinh_law_rate(pitch_rate_of_forces(forces, period, p), period, p)
-    at = np.rint(np.array(WINDOW) / period).astype(int)
-    return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
+    at = np.rint(np.array(GROWTH_WINDOW) / period).astype(int)
+    return np.sqrt(pitch_variance(np.array(GROWTH_WINDOW), rates[at], rigid_pitch(p).noise_intensity(NOISE, period)))
 
 
 def _solver_rows(solvers: list[Saved]) -> list[Row]:
@@ -244,7 +245,7 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
             Observed(
                 f"drift_solvers.growth.{key}",
                 SYSTEM,
-                f"ratio of the growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s to "
+                f"ratio of the growth of the pitch's spread from {GROWTH_WINDOW[0]:g} to {GROWTH_WINDOW[1]:g} s to "
                 f"the closed law, {smoothing_record['name']}",
                 smoothing_record["growth"] / smoothing_record["law"],
                 "",
@@ -281,7 +282,8 @@ def tables(case_data: Saved) -> list[Table]:
         for solver_record in case_data["solvers"]
     )
     note = (
-        f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
+        f"Study road at 20 m/s, {SAMPLING_RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of "
+        "an adaptive "
         f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear."
     )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
@@ -296,7 +298,7 @@ def tables(case_data: Saved) -> list[Table]:
             "treatment",
             "growth of the spread [1/s]",
             "law [1/s]",
-            f"spread at {WINDOW[1]:g} s [rad]",
+            f"spread at {GROWTH_WINDOW[1]:g} s [rad]",
             "damage f3z / true damage",
             "damage f3x / true damage",
         )

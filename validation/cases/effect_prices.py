@@ -27,7 +27,7 @@ SYSTEM: System = "effects"
 STEPS = {True: 2000, False: 4000}
 """Steps of the runs that are timed against hand-built ones, by ``quick``: 4 s are a fifth of a study scene, and short
 enough for both of a pair to meet the machine in one mood."""
-ROUNDS, PRICED = {True: 7, False: 80}, {True: 5, False: 15}
+RATIO_ROUNDS, PRICE_ROUNDS = {True: 7, False: 80}, {True: 5, False: 15}
 """Rounds of these runs, and of those that tell what an effect adds, by ``quick``."""
 SELDOM = 4
 """Of how many rounds the unchecked run is in the first."""
@@ -52,9 +52,11 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     with tempfile.TemporaryDirectory() as name:
         files_folder = Path(name)
         write_files(files_folder)
-        ratios = {engine: _ratio(engine, files_folder, STEPS[quick], ROUNDS[quick]) for engine in ("exudyn", "mujoco")}
+        ratios = {
+            engine: _ratio(engine, files_folder, STEPS[quick], RATIO_ROUNDS[quick]) for engine in ("exudyn", "mujoco")
+        }
         price = [
-            _price(effect, engine, files_folder, PRICED[quick])
+            _price(effect, engine, files_folder, PRICE_ROUNDS[quick])
             for i, effect in enumerate(EFFECTS)
             for j, engine in enumerate(ENGINES)
             if not quick or i % len(ENGINES) == j
@@ -129,7 +131,7 @@ def ratio_row(row: str, title: str, ratio: tuple[float, float, float], tolerance
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
     """Rows: a free wheelset with linear creep on cones, compared with code written for this alone."""
-    gap, ratio = ratio_of_wheelsets(steps, ROUNDS[quick])
+    gap, ratio = ratio_of_wheelsets(steps, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.wheelset",
@@ -157,7 +159,7 @@ def _rides(quick: bool) -> list[Row]:
     """
     rows = []
     for engine, steps in RIDES.items():
-        gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else ROUNDS[quick])
+        gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else RATIO_ROUNDS[quick])
         rows += [
             Observed(
                 f"effect_prices.same.ride.{engine}",
@@ -186,7 +188,7 @@ def _cars(steps: int, quick: bool) -> list[Row]:
     MuJoCo's own step is the same and so is the march of the tyres' cells, three fifths of the time; what is
     left, a microsecond of every call of the forces, is the walk through a table that any vehicle has.
     """
-    gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
+    gap, ratio = ratio_of_cars(steps, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.handling",
@@ -212,7 +214,7 @@ def _stops(quick: bool) -> list[Row]:
     A step compiled for any number of tyre tables and of their loads, where the written one has one of each,
     takes a third longer; asking for samples and recording them adds a tenth.
     """
-    gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
+    gap, ratio = ratio_of_stops(3.0 if quick else 10.0, RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.braking",
@@ -233,7 +235,7 @@ def _stops(quick: bool) -> list[Row]:
 
 def _contact(quick: bool) -> list[Row]:
     """Rows: FASTSIM on one ellipse without spin, called from Python, compared with code written for this alone."""
-    gap, ratio = ratio_of_contacts(ROUNDS[quick])
+    gap, ratio = ratio_of_contacts(RATIO_ROUNDS[quick])
     return [
         Observed(
             "effect_prices.same.contact",

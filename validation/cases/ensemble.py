@@ -35,7 +35,7 @@ SECONDS, MEMORY = 120.0, 2e9
 """Targets of the large ensemble on two cores."""
 STATE, MARKS = 8 * 8, 2 * 8
 """Bytes of a state that is kept, and of the times of drift-off and of failure of a path."""
-TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
+TABLE_TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 """Times (s) of the table of spreads."""
 SAME_BITS = "the same bits"
 
@@ -329,7 +329,7 @@ def _data(
     errors = paths["states"] - truth[:: round(1.0 / STEP)]
     spreads = [
         [when, *deviation_with_error(errors[:, round(when), 3]), *deviation_with_error(errors[:, round(when), 2])]
-        for when in TIMES
+        for when in TABLE_TIMES
     ]
     quantiles = [[level, *quantile_with_interval(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
     counts, edges = np.histogram(paths["drift_off"], bins=np.arange(0.0, 31.0, 0.5))

@@ -34,14 +34,14 @@ NO_DRAG = replace(R19, drags=())
 WHEELS = ("fl", "fr", "rl", "rr")
 LANE = Controls(steer=((0.0, 0.0), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)))
 SMALL_STEER = Controls(steer=tuple((time, 0.5 * angle) for time, angle in LANE.steer))
-LEVEL, SEED, SPEED = 4e-6, 3, 25.0
+ROAD_LEVEL, SEED, SPEED = 4e-6, 3, 25.0
 SLOPE, GENTLE = 0.1, 0.05
-ROUNDS = 60
+TIMING_ROUNDS = 60
 
 
 def lane_change(**changes: Any) -> Handling:
     """A lane change on a rough road."""
-    return Handling(R19, controls=LANE, waves=plane_waves(LEVEL, seed=SEED)).changed(**changes)
+    return Handling(R19, controls=LANE, waves=plane_waves(ROAD_LEVEL, seed=SEED)).changed(**changes)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -304,7 +304,7 @@ def _price_row() -> Row:
     steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
     jobs = _march(car, steps), _march(bare, steps), lambda: _repeat_tyres(4 * steps)
-    full, none, kernel = interleave(jobs, ROUNDS, 0.001, clock=time.process_time)
+    full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
     return Observed(
         "handling.price",

@@ -47,12 +47,12 @@ from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-LEVEL = 3.3
+STANDARD_ERRORS = 3.3
 """Standard errors within which a mean lies 999 times in 1,000."""
 UNEQUAL = np.array([0.1, 0.3, 0.6])
 """Random walk of each axis, rad per sqrt(s)."""
 EQUAL = 0.5
-PERIOD, SPAN = 5e-3, 2.0
+SAMPLE_PERIOD, RUN_SECONDS = 5e-3, 2.0
 """s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
 
 
@@ -102,8 +102,8 @@ def _one_axis(paths: int) -> list[Row]:
     motion."""
     rows = []
     for axis in range(3):
-        deviation = EQUAL / PERIOD**0.5 * np.eye(3)[axis]
-        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), PERIOD, deviation, paths))
+        deviation = EQUAL / SAMPLE_PERIOD**0.5 * np.eye(3)[axis]
+        turns = rotation_vector(attitude_errors(np.zeros((200, 3)), SAMPLE_PERIOD, deviation, paths))
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
@@ -114,7 +114,7 @@ def _one_axis(paths: int) -> list[Row]:
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
-                EQUAL**2 * 200 * PERIOD,
+                EQUAL**2 * 200 * SAMPLE_PERIOD,
                 paths,
                 f"s^2 t; {paths:,} paths, seed {SEED}",
             ),
@@ -134,8 +134,9 @@ def _mean(id: str, quantity: str, samples: np.ndarray, law: float, tolerance_rea
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
     return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
         law,
-        LEVEL * error,
-        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
+        STANDARD_ERRORS * error,
+        f"{tolerance_reason}; {len(samples):,} paths, seed {SEED}, within {STANDARD_ERRORS} standard errors of "
+        f"{error:.2g}",
         "closed form",
     )
 
@@ -143,43 +144,43 @@ def _mean(id: str, quantity: str, samples: np.ndarray, law: float, tolerance_rea
 def _three_axes(paths: int) -> list[Row]:
     """Rows on noise about three axes: with equal noise the mean trace of the error; with unequal noise on a turning
     body the mean error matrix and the mean quaternion."""
-    count = round(SPAN / PERIOD)
-    rates, root = turning_rates(count, PERIOD), PERIOD**0.5
-    equal = attitude_errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
-    wandered = attitude_errors(rates, PERIOD, UNEQUAL / root, paths)
+    count = round(RUN_SECONDS / SAMPLE_PERIOD)
+    rates, root = turning_rates(count, SAMPLE_PERIOD), SAMPLE_PERIOD**0.5
+    equal = attitude_errors(rates, SAMPLE_PERIOD, EQUAL / root * np.ones(3), paths)
+    wandered = attitude_errors(rates, SAMPLE_PERIOD, UNEQUAL / root, paths)
     trace, exact = (
         np.trace(rotation_matrix(equal), axis1=1, axis2=2),
-        mean_error(UNEQUAL, rates, PERIOD, START_ATTITUDE),
+        mean_error(UNEQUAL, rates, SAMPLE_PERIOD, START_ATTITUDE),
     )
-    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START_ATTITUDE)
+    resting = mean_error(UNEQUAL, np.zeros_like(rates), SAMPLE_PERIOD, START_ATTITUDE)
     all_equal = np.full(3, EQUAL)
-    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START_ATTITUDE)))
+    same = float(np.trace(mean_error(all_equal, rates, SAMPLE_PERIOD, START_ATTITUDE)))
     return [
         _mean(
             "trace",
             "mean trace of the error's rotation matrix, three equal axes, turning body",
             trace,
-            mean_trace(EQUAL, SPAN),
+            mean_trace(EQUAL, RUN_SECONDS),
             "3 exp(-s^2 t)",
         ),
         _mean(
             "scalar",
             "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
-            mean_scalar(all_equal, SPAN),
+            mean_scalar(all_equal, RUN_SECONDS),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             wandered[:, 0],
-            mean_scalar(UNEQUAL, SPAN),
+            mean_scalar(UNEQUAL, RUN_SECONDS),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _closed_form_row(
             "matrix.equal",
             "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
-            abs(same - mean_trace(EQUAL, SPAN)),
+            abs(same - mean_trace(EQUAL, RUN_SECONDS)),
             "",
             "both are exact",
         ),
@@ -190,7 +191,7 @@ def _three_axes(paths: int) -> list[Row]:
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
-            LEVEL,
+            STANDARD_ERRORS,
         ),
         Observed(
             "inertial_unit.matrix.resting",
@@ -199,7 +200,7 @@ def _three_axes(paths: int) -> list[Row]:
             "rest, worst entry over its standard error",
             standard_errors(wandered, resting),
             "",
-        ).beside(f"far beyond {LEVEL}", "the rows above can tell the laws apart", "closed form"),
+        ).beside(f"far beyond {STANDARD_ERRORS}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
@@ -391,7 +392,7 @@ def _recording(paths: int) -> CaseAnswer:
         ], {}
     recorded = recording.read(path)
     off = np.degrees(recording.gyro_error(recorded))
-    rates, period = recorded.rates[::5], 5 * recording.PERIOD
+    rates, period = recorded.rates[::5], 5 * recording.SAMPLE_PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
     wandered = attitude_errors(rates, period, deviation, paths)
     law = mean_error(deviation * period**0.5, rates, period, START_ATTITUDE)
@@ -400,7 +401,7 @@ def _recording(paths: int) -> CaseAnswer:
             "inertial_unit.recording",
             SYSTEM,
             "a minute in a real car: difference of the gyro's attitude from the camera's after "
-            f"{recording.PERIOD * (len(off) - 1):.0f} s, gyro alone, its bias removed",
+            f"{recording.SAMPLE_PERIOD * (len(off) - 1):.0f} s, gyro alone, its bias removed",
             float(off[-1]),
             "deg",
         ).beside("nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
@@ -410,6 +411,6 @@ def _recording(paths: int) -> CaseAnswer:
             standard_errors(wandered, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
-            LEVEL,
+            STANDARD_ERRORS,
         ),
     ], {"off": off[::20].tolist()}

@@ -42,7 +42,7 @@ METHODS = {
 CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
 STEPS = (40, 120)
 """Steps of the runs that are differenced."""
-BOUND = 1e-6
+COUNT_BOUND = 1e-6
 PROCESS_TIMEOUT = 900
 """Seconds until a process is given up."""
 ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
@@ -68,7 +68,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             float(largest.max()),
             "relative",
         ).at_most(
-            BOUND,
+            COUNT_BOUND,
             "the same instructions in the same order: seed of hashes and "
             "number of threads are set, and no clock's reading is printed while they are counted",
             "none",

@@ -30,7 +30,7 @@ TITLE = "The Kalman filter of the pitch"
 SYSTEM: System = "drift"
 SEED = 2000
 """First seed; the filter's settings were chosen on seeds 101 to 103."""
-LEVEL = 0.999
+BAND_PROBABILITY = 0.999
 """Of every band."""
 ENGINES = ("reference", "exudyn", "mujoco")
 SAMPLES, DURATION = 20, 30.0
@@ -136,7 +136,7 @@ def _outside_row(name: str, quantity: str, noise: str, values: np.ndarray, freed
 
 def _band(freedom: int) -> tuple[float, float]:
     """Confidence band for the mean of a chi-square sample, per degree of freedom."""
-    low, high = chi2.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], freedom) / freedom
+    low, high = chi2.ppf([(1 - BAND_PROBABILITY) / 2, (1 + BAND_PROBABILITY) / 2], freedom) / freedom
     return float(low), float(high)
 
 
@@ -144,7 +144,8 @@ def _band_row(name: str, quantity: str, values: np.ndarray, freedom: int, sample
     low, high = _band(freedom * len(values))
     mean = float(values.mean()) / freedom
     why = (
-        f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
+        f"{100 * BAND_PROBABILITY:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} "
+        "degrees of "
         f"freedom: {sample}"
     )
     return Observed(

@@ -30,7 +30,7 @@ TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
 PLACE_BOUND, FORCE_BOUND = 0.3, 2.0
 """Bounds asked for: mm and %."""
-QUICK = (1.0, 6.5)
+QUICK_SHIFTS = (1.0, 6.5)
 """Shifts (mm) of case A-2 in the quick share."""
 FILES = (0.0, 2.0, 5.0, 6.0, 6.5, 10.0)
 """Shifts (mm) at which the built-in profiles are compared with the benchmark's files."""
@@ -42,7 +42,7 @@ WHEELS = {"right": 2, "left": 5}
 @allowing_breaches("the benchmark takes elastic steel, as its codes do", "elastic")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
-    published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
+    published = CONTACT[np.isin(CONTACT[:, 0], QUICK_SHIFTS)] if quick else CONTACT
     placed, position_seconds = _timed_positions("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     rows.append(

@@ -39,12 +39,12 @@ SYSTEM: System = "drift"
 ROADS: tuple[Ride, ...] = (("A", 1, 30.0, 15.0), ("B", 2, 20.0, 5.0), ("C", 3, 20.0, 20.0), ("D", 5, 10.0, 15.0))
 """Of clean recordings."""
 SAMPLES = 4
-SHARE = 0.2
+SIZE_TOLERANCE = 0.2
 """Part of a planted size by which what is found may be off."""
 VERTICAL = tuple(f"{hub}_fz" for hub in ("fl", "fr", "rl", "rr"))
 DEGREES = 180 / np.pi
 DELAY = 3e-3
-QUICK = (
+QUICK_FAULTS = (
     PlantedMeasurementFault("3 ms late, one force", "shift", "fl_fz", DELAY, "s", faults={"delay": {"fl_fz": DELAY}}),
     PlantedMeasurementFault(
         "left and right front wheel swapped", "swapped", "fl with fr", 1.0, "", exchanged_hubs(("fl", "fr"))
@@ -93,7 +93,7 @@ LEVERS = {
     "moments about the contact patch, one wheel": (-0.34, ("rr",)),
     "moments referred to the hub twice, one axle": (0.3, ("fl", "fr")),
 }
-FULL = (
+FULL_FAULTS = (
     *(
         PlantedMeasurementFault(name, check, place, size, unit, faults={key: amounts})
         for name, check, place, size, unit, key, amounts in AMOUNTS
@@ -127,7 +127,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Single faults on one road; in full also clean recordings on four, faults together, and other noise."""
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, finding_texts = [], dict[str, str]()
-    for fault in QUICK if quick else QUICK + FULL:
+    for fault in QUICK_FAULTS if quick else QUICK_FAULTS + FULL_FAULTS:
         findings = planted_findings(virtual, folder, fault.spoil, **fault.faults)
         rows += _rows(fault, findings)
         finding_texts[fault.name] = findings[0].text if findings else "nothing"
@@ -154,7 +154,7 @@ def _sized(key: str, quantity: str, size_found: float, unit: str, planted_size: 
     """Row that compares a found size with the size of the planted fault."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
     return Observed(id, SYSTEM, quantity, size_found, unit).within(
-        planted_size, SHARE * abs(planted_size), why, "closed form"
+        planted_size, SIZE_TOLERANCE * abs(planted_size), why, "closed form"
     )
 
 
@@ -227,7 +227,7 @@ def _wrong_vehicles(folder: Path) -> list[Row]:
         "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     )
     return [
-        Observed(id, SYSTEM, what, excess, "%").within(wanted, SHARE * 6.6, why, "closed form"),
+        Observed(id, SYSTEM, what, excess, "%").within(wanted, SIZE_TOLERANCE * 6.6, why, "closed form"),
         _row_of_no_findings("strangers", quantity, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
@@ -250,7 +250,9 @@ def _three_faults_rows(virtual_measurement: VirtualMeasurement, folder: Path) ->
 
 def _spread(virtual_measurement: VirtualMeasurement, folder: Path) -> Row:
     """Row: mean of the delay found in one channel over several noise samples, as a check of its bias."""
-    samples = [planted_findings(virtual_measurement, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
+    samples = [
+        planted_findings(virtual_measurement, folder, seed=seed, **QUICK_FAULTS[0].faults) for seed in range(SAMPLES)
+    ]
     late = 1e3 * float(
         np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
     )

@@ -30,18 +30,18 @@ FLOAT = 2.0**-24
 RESOLUTION = {".csv": 0.0, ".mf4": 0.0, ".rsp": FLOAT, ".tdms": 0.0}
 """Of a value, by format."""
 FORMATS = {".csv": "CSV", ".mf4": "MDF 4", ".rsp": "RPC III", ".tdms": "TDMS"}
-START = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
+START_DATE = datetime(2026, 11, 21, 8, 0, 0, 123456, tzinfo=timezone(timedelta(hours=1)))
 COMMENT = "Prüfgelände, Runde 3 <nass>\nFahrer & Beifahrer"
-NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
+CHANNEL_NAMES = ("Kraft vorn links, Fz", "Größe µ", "a [x]")
 UNITS = ("kN", "°", "m/s^2")
 COMMENTS = ('Rad 1: "neu"', "", "zweite Zeile\nfolgt")
-COUNT, PERIOD, LENGTH = 5000, 1e-3, 1234
+SAMPLE_COUNT, SAMPLE_PERIOD, BLOCK_SAMPLES = 5000, 1e-3, 1234
 """Samples, s between them, samples of a block that is read."""
 
 
 def samples() -> np.ndarray:
     """Values (count, 3) of many sizes, with a gap."""
-    values = normal_samples(SEED, 0, COUNT, 3) * np.array([1e3, 1e-6, 1.0])
+    values = normal_samples(SEED, 0, SAMPLE_COUNT, 3) * np.array([1e3, 1e-6, 1.0])
     values[100:200, 1] = np.nan
     return values
 
@@ -49,7 +49,9 @@ def samples() -> np.ndarray:
 def written(path: Path, values: np.ndarray) -> Path:
     """Write the values to a file in blocks of 700 samples; returns its path."""
     blocks = (values[i : i + 700] for i in range(0, len(values), 700))
-    return write(path, [ChannelGroup(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
+    return write(
+        path, [ChannelGroup(CHANNEL_NAMES, UNITS, COMMENTS, SAMPLE_PERIOD, len(values), blocks)], START_DATE, COMMENT
+    )
 
 
 def largest_difference(values: np.ndarray, truth: np.ndarray) -> float:
@@ -64,11 +66,11 @@ def is_kept(measurement_source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start time are read back as they were written, and nothing else was
     reported."""
     return {
-        "names": tuple(channel.name for channel in measurement_source.channels) == NAMES,
+        "names": tuple(channel.name for channel in measurement_source.channels) == CHANNEL_NAMES,
         "units": tuple(channel.unit for channel in measurement_source.channels) == UNITS,
         "comments": tuple(channel.comment for channel in measurement_source.channels) == COMMENTS
         and measurement_source.comment == COMMENT,
-        "start": measurement_source.start == START,
+        "start": measurement_source.start == START_DATE,
         "quiet": measurement_source.noticed == (),
     }
 
@@ -99,16 +101,16 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
     truth, form = samples(), FORMATS[file_extension]
     began = time.perf_counter()
     source = open_source(written(path, truth))
-    blocks = list(source.blocks(NAMES, LENGTH))
+    blocks = list(source.blocks(CHANNEL_NAMES, BLOCK_SAMPLES))
     seconds = time.perf_counter() - began
     values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
     library, reading = LIBRARIES[file_extension]
     foreign = reading(path)
-    same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
-    there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
+    same = [foreign.get(name, (None, ""))[1] for name in CHANNEL_NAMES] == list(UNITS)
+    there = np.column_stack([foreign[name][0] for name in CHANNEL_NAMES]) if same else np.full_like(truth, np.inf)
     error, off, by_library = (
         largest_difference(values, truth),
-        float(np.abs(times - PERIOD * np.arange(COUNT)).max()),
+        float(np.abs(times - SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)).max()),
         largest_difference(there, truth),
     )
     lost = ", ".join(what for what, good in is_kept(source).items() if not good)
@@ -146,7 +148,7 @@ def round_trip(path: Path, file_extension: str) -> tuple[list[Row], dict[str, An
         "values": error,
         "times": off,
         "own": by_library,
-        "rate": COUNT * len(NAMES) / seconds,
+        "rate": SAMPLE_COUNT * len(CHANNEL_NAMES) / seconds,
     }
 
 
@@ -300,7 +302,7 @@ def memory(path: Path, file_extension: str) -> list[Row]:
 def tables(case_data: dict[str, Any]) -> list[Table]:
     """Table of what each file format preserves."""
     note = (
-        f"{COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
+        f"{SAMPLE_COUNT:,} samples of three channels, values from 1e-6 to 1e3, written and read by block. Errors of "
         "values are by the size of each value; the format's own library opens the same file. CSV and RPC III "
         "have one sampling rate, MDF 4 and TDMS one per group."
     )

@@ -45,7 +45,7 @@ NOISE = {"force": 8.0, "moment": 1.0, "angle": np.radians(0.1), "angular rate": 
 RECORDER_DELAY = 0.003
 """s, by which the inertial unit's recorder is late, which the scene states."""
 DAMAGE = 0.03
-RATE, DURATION = 500.0, 5.0
+SAMPLING_RATE, DURATION = 500.0, 5.0
 """Hz, s, of the proofs."""
 COPIES = 16
 """Paths of the ensembles beside a predicted time of trust."""
@@ -95,7 +95,12 @@ def own_vehicle(folder: Path) -> str:
 
 def measured(proof_case: Proof, folder: Path, duration: float) -> VirtualMeasurement:
     """The virtual measurement of a vehicle on its road; faults and noise are added to each sample later."""
-    table = {"duration": duration, "sampling_rate": RATE, "frame": proof_case.frame, "sections": ["front left"]}
+    table = {
+        "duration": duration,
+        "sampling_rate": SAMPLING_RATE,
+        "frame": proof_case.frame,
+        "sections": ["front left"],
+    }
     vehicle = cut(load_vehicle(proof_case.vehicle, folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
@@ -279,9 +284,11 @@ def _trust_times() -> list[Row]:
         ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))),
     )
     for name, frame, duration, level in cases:
-        virtual = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
+        virtual = read(
+            VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": SAMPLING_RATE, "frame": frame}, ""
+        )
         true = virtual_measurement(vehicle, virtual, "mujoco")
-        predicted = predicted_drift(vehicle, level, 1 / RATE, duration, frame).passing_time()
+        predicted = predicted_drift(vehicle, level, 1 / SAMPLING_RATE, duration, frame).passing_time()
         assert predicted is not None
         drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(

@@ -34,12 +34,12 @@ from validation.spatial.spatial_motion import sensor_readings as readings_on_pat
 TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
 SEED = 30
-BOUND = 1e-12
+CLOSED_FORM_BOUND = 1e-12
 HEIGHTS = {1.0: 0.69, 0.3: 1.9, 0.1: 5.8, 0.03: 18.9}
 """Height (m) of the fifth sensor over a floor of 2 m by 1.2 m -> known gain relative to the last sensor (1/m)."""
 NOISE = 0.3
 """m/s^2 on each sample of the drift rows."""
-PERIOD = 0.01
+SAMPLE_PERIOD = 0.01
 RIGID = {
     "front left": (1.1, -0.6, 0.2),
     "front right": (1.1, 0.6, 0.2),
@@ -83,7 +83,7 @@ def _rows_without_integration(name: str) -> list[Row]:
         ("consistency", "share of the readings that no rigid body explains", fit_quality(array, clean).share, ""),
     )
     return [
-        Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(BOUND, why, "closed form")
+        Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(CLOSED_FORM_BOUND, why, "closed form")
         for id, words, value, unit in shown
     ]
 
@@ -102,7 +102,9 @@ def _plain() -> Row:
         float(np.abs(plain - half).max()),
         "rad/s^2",
     ).at_most(
-        BOUND, "half of the true value plus a bias, without a word: this is why planes are detected", "closed form"
+        CLOSED_FORM_BOUND,
+        "half of the true value plus a bias, without a word: this is why planes are detected",
+        "closed form",
     )
 
 
@@ -221,7 +223,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             float(np.abs(acceleration - true).max() / np.abs(true).max()),
             "",
         ).at_most(
-            BOUND,
+            CLOSED_FORM_BOUND,
             "the engine's acceleration beside eq. (38), as in the build audit",
             "shared kernel" if engine == "reference" else "native",
         ),
@@ -241,7 +243,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
             fit_quality(array, felt).share,
             "",
-        ).at_most(BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
+        ).at_most(CLOSED_FORM_BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
 
 
@@ -277,7 +279,7 @@ def _recovered_errors(
 
 def _moving(sample_count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     """A body that turns all the time: true rates (n, 3), sensor array, and noise-free readings without gravity."""
-    t = PERIOD * np.arange(sample_count)
+    t = SAMPLE_PERIOD * np.arange(sample_count)
     rates = np.column_stack([0.5 * np.sin(2 * t), 0.4 * np.cos(1.3 * t), 0.3 + 0.1 * np.sin(t)])
     alpha = np.column_stack([np.cos(2 * t), -0.52 * np.sin(1.3 * t), 0.1 * np.cos(t)])
     array = sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
@@ -296,7 +298,10 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Row and curves: if rates are only integrated, their error grows with the square root of time."""
     count, array = 6001, sensor_array(SENSOR_ARRANGEMENTS["5, one 1 m up"])
     errors = np.array(
-        [integrate_rates(spin_from_readings(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)]
+        [
+            integrate_rates(spin_from_readings(array, _noise(path, count)), SAMPLE_PERIOD, np.zeros(3))
+            for path in range(paths)
+        ]
     )
     row = mean_square(
         Observed(
@@ -306,14 +311,14 @@ def _random_walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
             float(np.mean((errors[:, -1] / array.noise_gains()) ** 2)),
             "m^2/s^2",
         ),
-        NOISE**2 * PERIOD * (count - 1) * PERIOD,
+        NOISE**2 * SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD,
         3 * paths,
         f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
     curves = {
-        "time": PERIOD * np.arange(count),
+        "time": SAMPLE_PERIOD * np.arange(count),
         "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
-        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
+        "law": NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD**2 * np.arange(count)),
     }
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
@@ -323,18 +328,21 @@ def _symmetric_part_measured(curves: Saved, quick: bool) -> list[Row]:
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
     filtered = [
-        filter_rates(spin_from_readings(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE)
+        filter_rates(spin_from_readings(array, clean + _noise(path, count)), SAMPLE_PERIOD, rates[0], NOISE)
         for path in range(paths)
     ]
     squares = np.mean([np.mean((held_rates - rates) ** 2, axis=1) for held_rates, _ in filtered], axis=0)
     stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
+    walked = NOISE * root_mean_square(array.noise_gains()) * np.sqrt(SAMPLE_PERIOD * (count - 1) * SAMPLE_PERIOD)
     late, early = (
         float(np.sqrt(np.mean(covariance_part)))
         for covariance_part in (squares[-count // 3 :], squares[count // 6 : count // 3])
     )
-    why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
+    why = (
+        f"{paths} paths of {SAMPLE_PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended "
+        "Kalman filter"
+    )
     rows = [
         Observed(
             "motion.held",

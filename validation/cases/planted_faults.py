@@ -40,7 +40,7 @@ CAMPAIGNS = (
     choosing.CAMPAIGN,
     advice.CAMPAIGN,
 )
-FEW = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
+QUICK_FAULTS = (DESCRIPTION_FAULTS[0], EQUATIONS_FAULTS[0])
 QUICK_SPACING, FEWEST_FAULTS = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
 
@@ -48,7 +48,7 @@ QUICK_SPACING, FEWEST_FAULTS = 16, 40
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows on planted faults by system and, in full, over all systems; quick: every sixteenth fault of each system."""
     plane = (
-        pitch_plane.measure(FEW, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
+        pitch_plane.measure(QUICK_FAULTS, CONTROLS_WITHOUT_FAULT[:1], (pitch_plane.ASYMMETRIC_SET,))
         if quick
         else pitch_plane.measure()
     )

@@ -20,10 +20,10 @@ DAMPED = (0.0, 1e-8, 1e-4, 1e-2, 1.0, 100.0)
 """Damping times time."""
 LENGTHS = (10, 1_000_000)
 TIME = 10.0
-BOUND = 1e-10
+RELATIVE_BOUND = 1e-10
 
 Matrix = list[list[Decimal]]
-WHY = (
+BOUND_REASON = (
     "the linear equation of the covariance itself, stepped by squaring its matrix in 60 decimal digits: no sum, no "
     "integral and no digit shared with the closed form"
 )
@@ -42,7 +42,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             f"largest relative error of the covariance, {name}, product of damping and time {x:g}",
             error,
             "",
-        ).at_most(BOUND, WHY, "closed form")
+        ).at_most(RELATIVE_BOUND, BOUND_REASON, "closed form")
         for name, errors in exact.items()
         for x, error in zip(DAMPED, errors, strict=True)
     ]

@@ -51,7 +51,7 @@ FULL_ONLY: tuple[Make, ...] = (
     contact_alone.problem,
 )
 """Problems that a quick run leaves out; it has those of PROBLEMS."""
-ROUNDS = {True: 1, False: 15}
+TIMING_ROUNDS = {True: 1, False: 15}
 """Interleaved rounds of timing, by ``quick``, of settings whose seconds decide something."""
 SHORTEST_TURN = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
@@ -76,7 +76,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    rounds = ROUNDS[quick]
+    rounds = TIMING_ROUNDS[quick]
     if quick:
         priced, (beside, data) = [_priced(True, rounds, make) for make in PROBLEMS], _beside(True, rounds)
     else:

@@ -18,7 +18,7 @@ Judged = tuple[list[Verdict], list[str]]
 
 TITLE = "What to recommend"
 SYSTEM: System = "cost"
-QUICK = 8
+QUICK_SCENE_NUMBER = 8
 """Number of the one scene that a quick run draws."""
 SCENES = {"pitch-plane": 88, "braking": 6, "wheelset": 4, "handling": 2}
 """How many scenes of each system a full run judges."""
@@ -38,7 +38,7 @@ error."""
 )
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
-    both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
+    both = [judged("pitch-plane", QUICK_SCENE_NUMBER, folder, (ENGINE,))] if quick else _shared(folder)
     verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
     return _rows(verdicts, refused), {
         "verdicts": [[asdict(verdict) for verdict in of_scene] for of_scene in verdicts],

@@ -27,7 +27,7 @@ TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
 SEED = 21
 COPIES = 4000
-POINTS = ("body front", "body centre", "body rear")
+BODY_POINTS = ("body front", "body centre", "body rear")
 DRIVES = {
     "accelerating": SpeedProfile((0.0, 25.0 / 3.0), (5.0, 30.0)),
     "braking": SpeedProfile((0.0, 3.0), (30.0, 6.0)),
@@ -163,7 +163,7 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     copies, slow = _timed(variances_along_drive, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
     varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
-    columns = [varied.names.index(point) for point in POINTS]
+    columns = [varied.names.index(point) for point in BODY_POINTS]
     near = np.abs(varied.time[:, None] - often).argmin(axis=0)
     return {
         "time": varied.time[near].tolist(),
@@ -221,7 +221,7 @@ def _constant() -> list[Row]:
         / REPEATS
     )
     copies, slow = _timed(at_constant_speed, vehicle, road, STEADY_SPEED, LASTING, copies=STEADY_COPIES, seed=SEED)
-    columns = [copies.names.index(point) for point in POINTS]
+    columns = [copies.names.index(point) for point in BODY_POINTS]
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
     return [
@@ -320,7 +320,7 @@ def tables(case_data: dict[str, Any]) -> list[Table]:
     if not rows:
         return []
     note = f"How many standard errors the variance over {COPIES} copies lies above the covariance along the drive."
-    return [Table("Monte Carlo at varying speed", note, ("drive", "time", *POINTS), tuple(rows))]
+    return [Table("Monte Carlo at varying speed", note, ("drive", "time", *BODY_POINTS), tuple(rows))]
 
 
 def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -331,7 +331,7 @@ def draw(case_data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, axes = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.9), sharey=True)
     for axis, (name, drive) in zip(axes, case_data.items(), strict=True):
-        for column, point in enumerate(POINTS):
+        for column, point in enumerate(BODY_POINTS):
             pick = [row[column] for row in drive["deviation"]]
             (line,) = axis.plot(drive["time"], pick, label=point)
             colour = line.get_color()

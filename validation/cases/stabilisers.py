@@ -25,9 +25,9 @@ from validation.common.scenes import VEHICLE_SETS, on_paper_road, road_scene
 TITLE = "Stabilisers"
 SYSTEM: System = "drift"
 STEP = 1e-3
-MISSING, SHIFT = 0.05, 0.02
+MISSING_MASS_SHARE, CENTRE_SHIFT = 0.05, 0.02
 """Part of the chassis that the model lacks; how far (m) ahead of the truth its centre of mass lies."""
-BOUND = 1e-3
+MEAN_BOUND = 1e-3
 """Of the predicted mean: forces linear between samples of 1 ms leave 1e-4."""
 SEED, SENSOR = 37, np.deg2rad(0.1)
 """Seed of the noise on a measured pitch, and its standard deviation per sample (rad)."""
@@ -82,20 +82,23 @@ def _missing_mass(
 ) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light, prescribing the heave takes a mean force of dm (g - z3'')."""
     write_motion(measured_run, folder)
-    scene = build_follower({"m3": (1 - MISSING) * p.m3}, RAILS)
+    scene = build_follower({"m3": (1 - MISSING_MASS_SHARE) * p.m3}, RAILS)
     rate = measured_run["z3_rate"]
     mean = (rate[-1] - rate[0]) / scene.run.duration
-    wanted = MISSING * p.m3 * (p.g - mean)
+    wanted = MISSING_MASS_SHARE * p.m3 * (p.g - mean)
     return [
         Observed(
             f"stabilisers.mass.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING:.0%} of the "
-            f"chassis missing (0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)",
+            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING_MASS_SHARE:.0%} of the "
+            f"chassis missing (0.05 m3 g = {MISSING_MASS_SHARE * p.m3 * p.g:.1f} N)",
             float(guided(scene, engine)["enforced_force"].mean()),
             "N",
         ).within(
-            wanted, BOUND * wanted, f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here", "closed form"
+            wanted,
+            MEAN_BOUND * wanted,
+            f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here",
+            "closed form",
         )
         for engine in CONSTRAINED
     ]
@@ -106,18 +109,18 @@ def _shifted_centre(
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
-    write_motion(measured_run, folder, SHIFT)
-    scene = build_follower({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
-    wanted = SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
+    write_motion(measured_run, folder, CENTRE_SHIFT)
+    scene = build_follower({"a": p.a + CENTRE_SHIFT, "b": p.b - CENTRE_SHIFT}, RAILS)
+    wanted = CENTRE_SHIFT * float(np.mean((measured_run["f3"] + measured_run["f4"]) * np.cos(measured_run["pitch"])))
     return [
         Observed(
             f"stabilisers.centre.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {SHIFT:g} "
-            f"m too far ahead (m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)",
+            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {CENTRE_SHIFT:g} "
+            f"m too far ahead (m3 g x = {CENTRE_SHIFT * p.m3 * p.g:.1f} N m)",
             float(guided(scene, engine)["enforced_moment"].mean()),
             "N m",
-        ).within(wanted, BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
+        ).within(wanted, MEAN_BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
         for engine in CONSTRAINED
     ]
 

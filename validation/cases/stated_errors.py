@@ -23,15 +23,15 @@ SYSTEM: System = "cost"
 SEED = 21
 SYSTEMS = modules_of("validation.stated_errors.systems")
 """Modules that draw samples, by system."""
-COUNT = 60
+SAMPLES_OF_ALL = 60
 """Samples of all systems together, at least; as many of each."""
-QUICK = {"pitch-plane": 3}
+QUICK_SAMPLES = {"pitch-plane": 3}
 """Those of the quick share."""
 NEAR, FAR, TENTH = 3.0, 10.0, 0.1
 """Ratios of true to stated error: up to which it is right, from which it misleads, and below which it is useless."""
-SHARE, FEW, COST = 0.95, 0.1, 0.6
+LEAST_RIGHT_SHARE, LARGEST_USELESS_SHARE, LARGEST_COST = 0.95, 0.1, 0.6
 """Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
-EDGE = 1e-12
+ROUNDING_SHARE = 1e-12
 """True errors below this share of their channel are rounding."""
 
 
@@ -39,7 +39,7 @@ EDGE = 1e-12
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
     names = list(SYSTEMS)
-    counts = QUICK if quick else dict.fromkeys(names, -(-COUNT // len(names)))
+    counts = QUICK_SAMPLES if quick else dict.fromkeys(names, -(-SAMPLES_OF_ALL // len(names)))
     samples = [sample for of_system in _make_samples(counts) for sample in of_system]
     return [*_rows(samples, quick), *(row for name in counts for row in _of_system(name, samples))], {
         "samples": samples
@@ -81,7 +81,7 @@ def _sample_as_table(system: str, sample: Sample) -> Saved:
         "share": stated.share,
         "warned": stated.warned,
         "ratio": ratio(true, stated.error),
-        "rounding": true <= EDGE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
+        "rounding": true <= ROUNDING_SHARE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
     }
 
 
@@ -100,7 +100,10 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
     costs = [_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
     near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
     below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
-    asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
+    asked, tenth = (
+        f"asked: {100 * LEAST_RIGHT_SHARE:g} of 100",
+        "asked: at most a tenth; below rounding no error tells anything",
+    )
     shares = (
         [
             Observed("stated_errors.near", SYSTEM, near, right, "").beside(1.0, asked, "none"),
@@ -108,8 +111,8 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
         ]
         if quick
         else [
-            Observed("stated_errors.near", SYSTEM, near, right, "").within(1.0, 1.0 - SHARE, asked, "none"),
-            Observed("stated_errors.useless", SYSTEM, below, useless, "").at_most(FEW, tenth, "none"),
+            Observed("stated_errors.near", SYSTEM, near, right, "").within(1.0, 1.0 - LEAST_RIGHT_SHARE, asked, "none"),
+            Observed("stated_errors.useless", SYSTEM, below, useless, "").at_most(LARGEST_USELESS_SHARE, tenth, "none"),
         ]
     )
     return [
@@ -129,7 +132,7 @@ def _rows(samples: list[Saved], quick: bool) -> list[Row]:
             "ratio of the force evaluations of the error estimate to those of the run, median of systems",
             float(np.median(costs)),
             "",
-        ).at_most(COST, "asked: about half the run again", "none"),
+        ).at_most(LARGEST_COST, "asked: about half the run again", "none"),
         Observed(
             "stated_errors.without",
             SYSTEM,
@@ -168,7 +171,7 @@ def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     shown = (
         ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
         ("ratio", "median ratio of true to stated error", middle, 1.0),
-        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), COST),
+        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), LARGEST_COST),
     )
     return [
         Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{sample_text}: {what}", value, "").beside(

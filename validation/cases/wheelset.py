@@ -29,7 +29,7 @@ from validation.faults import wheelset as faults
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
-EDGE = 2e-3
+EDGE_RADIUS = 2e-3
 """Radius (m) of rails that are edges: Klingel's own wheelset."""
 STEP, DURATION = 5e-4, 1.0
 LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
@@ -78,7 +78,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         waves = {engine: wavelength(implementation(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_spread(waves.values()))
-        edge = wheelset.changed(head_radius=EDGE)
+        edge = wheelset.changed(head_radius=EDGE_RADIUS)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"

@@ -36,7 +36,7 @@ CELL, DEEPEST = 1e-4, 1e-3
 """m: of the exact theory on this plane, and more than the bodies reach into each other."""
 PATCH_LOAD_TOLERANCE, SINKING_TOLERANCE = 1e-4, 1e-8
 """Of the load, to which two patches that sink each other are followed; m, to which their approach is found."""
-SEARCH_REACH, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
+SEARCH_REACH, SEARCH_GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
 (m) over which the rail's angle is taken."""
 
@@ -129,7 +129,7 @@ def first_touch(
     roll, yaw = sign * placed.roll, sign * placed.yaw
     ahead, reach_u, reach_a = 0.0, SEARCH_REACH[0], SEARCH_REACH[1]
     for _ in range(HALVINGS):
-        u, a = np.meshgrid(position_guess + reach_u * GRID, ahead + reach_a * GRID)
+        u, a = np.meshgrid(position_guess + reach_u * SEARCH_GRID, ahead + reach_a * SEARCH_GRID)
         radius = wheel_and_rail.wheelset.radius + np.interp(u, wheel_and_rail.wheel.y, wheel_and_rail.wheel.z)
         x, y, z = radius * np.sin(a), wheel_and_rail.wheelset.arm + u, radius * np.cos(a)
         y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)

@@ -23,7 +23,7 @@ STANDARD_LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
 """Figure 6 of ASTM E1049-85, whose cycles are printed there: 0.5 of 3, 1.5 of 4, 0.5 of 6, 1 of 8, 0.5 of 9."""
 PRINTED_CYCLES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
 SENSOR_PLACES = {"a": (1.2, 0.3, 0.1), "b": (-0.9, 0.5, 0.4), "c": (0.2, -0.8, -0.3), "d": (0.1, 0.2, 0.9)}
-PERIOD, SAMPLE_COUNT = 5e-3, 400
+SAMPLE_PERIOD, SAMPLE_COUNT = 5e-3, 400
 UNIT_FACTORS = {
     ("kN", "force"): 1e3,
     ("deg/s", "angular rate"): np.pi / 180,
@@ -121,7 +121,7 @@ def _section_force_error() -> float:
 def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     """Sensors on a body that pitches and heaves: their array, readings (n, 4, 3), pitch (n,) and vertical
     acceleration."""
-    t = PERIOD * np.arange(SAMPLE_COUNT)
+    t = SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)
     pitch, rate, turn = (0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t))
     heave = 2.0 * np.cos(3 * t)
     no_angles = np.zeros(SAMPLE_COUNT)
@@ -134,8 +134,8 @@ def _turning_body() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
 def _motion_errors() -> float:
     """Errors of the rates and the vertical acceleration of this body that are computed from the readings."""
     array, read, _, heave = _turning_body()
-    moved_body = body.recovered_motion(array, read, PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
-    rate = 0.6 * np.cos(2 * PERIOD * np.arange(SAMPLE_COUNT))
+    moved_body = body.recovered_motion(array, read, SAMPLE_PERIOD, body.StartState(rates=(0.0, 0.6, 0.0)))
+    rate = 0.6 * np.cos(2 * SAMPLE_PERIOD * np.arange(SAMPLE_COUNT))
     return max(
         largest_relative_difference(moved_body.rates[:, 1], rate),
         largest_relative_difference(moved_body.acceleration[:, 2], heave),

@@ -28,7 +28,7 @@ from validation.hard_cases.setups import (
     vehicle,
 )
 
-PERIOD, NOISE = 1e-3, 0.1
+SAMPLE_PERIOD, NOISE = 1e-3, 0.1
 FLOOR_SENSORS = {
     "fl": (1.1, -0.6, 0.2),
     "fr": (1.1, 0.6, 0.2),
@@ -58,10 +58,12 @@ def _readings_of_run(
     start = vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
     base = vehicle(
         initial=start if initial is None else initial,
-        effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
+        effects={"accelerometers": {"sampling_rate": 1 / SAMPLE_PERIOD, "sensors": sensors, "deviation": noise}},
     )
-    assembly = base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
-    engine_settings = settings(engine, PERIOD, 0.3)
+    assembly = (
+        base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
+    )
+    engine_settings = settings(engine, SAMPLE_PERIOD, 0.3)
     model = build(engine, assembly, engine_settings)
     run = simulate(assembly.scene, engine, engine_settings, assembly)
     felt = readings_of(run, assembly.scene.effects["accelerometers"])
@@ -140,7 +142,7 @@ def gap(engine: str, folder: Path) -> float:
     felt, states, _ = _readings_of_run(engine, ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
     return largest_magnitude(
-        recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD).rates - _angular_velocities(states)
+        recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD).rates - _angular_velocities(states)
     )
 
 
@@ -163,7 +165,7 @@ def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.n
 def tumbling(engine: str, folder: Path) -> float:
     """Case: the nose passes through the vertical, which an orientation by matrices must stand."""
     felt, states, start = _free_fall(engine, 1.4, 3.0)
-    orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).orientation
+    orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
     no_angles = np.zeros(len(states))
     return largest_magnitude(
         rotation_matrix(orientation) - rotation_matrix(from_cardan(no_angles, states[:, 3], no_angles))
@@ -174,7 +176,9 @@ def locked(engine: str, folder: Path) -> float:
     """Case: the nose points straight up, where roll and yaw are not unique. Error: largest roll or yaw that is
     given."""
     felt, _, start = _free_fall(engine, np.pi / 2, 0.0)
-    return largest_magnitude(recovered_motion(sensor_array(ROOF_SENSORS), felt, PERIOD, start).angles()[:, [0, 2]])
+    return largest_magnitude(
+        recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).angles()[:, [0, 2]]
+    )
 
 
 def locked_naive(folder: Path) -> str:

@@ -20,8 +20,8 @@ from validation.drift.kalman_runs import relative_state_matrices
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, static_forces, vehicle
 
-PERIOD, DURATION = 5e-3, 6.0
-FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
+SAMPLE_PERIOD, DURATION = 5e-3, 6.0
+FORCE, ANGLE, START_TURN = 16.0, 8e-4, 0.2
 """Deviations: N per force sample, rad per angle, rad of a start that is not known."""
 SLOW_PERIOD = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
@@ -35,13 +35,13 @@ def _largest_pitch_error(
 
     The filter starts from a pitch that is ``turn_deviation`` (rad) wrong.
     """
-    count = round(DURATION / PERIOD) + 1
+    count = round(DURATION / SAMPLE_PERIOD) + 1
     base = vehicle()
-    forces = static_forces(base, count, PERIOD, is_held=False).values
-    write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
+    forces = static_forces(base, count, SAMPLE_PERIOD, is_held=False).values
+    write_wheel_forces(folder, forces[:, 0], forces[:, 1], SAMPLE_PERIOD)
     measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     measured_pitch[lost_samples] = np.nan
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, PERIOD)
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
     p, start = base.parameters, base.initial.copy()
     start[[0, 1, 3]] += turn_deviation * np.array([-p.b, p.a, 1.0])
     scene = build(
@@ -59,7 +59,7 @@ def _largest_pitch_error(
         folder,
     )
     run = simulate(scene, engine)
-    ended = PERIOD * (lost_samples.stop or 0)
+    ended = SAMPLE_PERIOD * (lost_samples.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
@@ -79,7 +79,7 @@ def outage_naive(folder: Path) -> str:
 
 def wrong_start(engine: str, folder: Path) -> float:
     """Case: the initial pitch is wrong by one stated deviation."""
-    return _largest_pitch_error(engine, folder, slice(0, 0), TURN, start_deviation=TURN)
+    return _largest_pitch_error(engine, folder, slice(0, 0), START_TURN, start_deviation=START_TURN)
 
 
 def certain_start(engine: str, folder: Path) -> float:
@@ -87,16 +87,18 @@ def certain_start(engine: str, folder: Path) -> float:
     stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
     base = vehicle()
-    forces = static_forces(base, count + 1, PERIOD, is_held=False)
+    forces = static_forces(base, count + 1, SAMPLE_PERIOD, is_held=False)
     assembly = driven_by_forces(base, forces)
     assembly = replace(
         assembly,
         scene=assembly.scene.model_copy(
-            update={"run": assembly.scene.run.model_copy(update={"duration": count * PERIOD})}
+            update={"run": assembly.scene.run.model_copy(update={"duration": count * SAMPLE_PERIOD})}
         ),
     )
     measured_pitch = base.initial[3] + exact * normal_samples(7, 0, count + 1, 1, source=PITCH_SENSOR)
-    estimated = estimate(assembly, Measurement(measured_pitch, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
+    estimated = estimate(
+        assembly, Measurement(measured_pitch, SAMPLE_PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0
+    )
     P = estimated.errors()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
     values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))

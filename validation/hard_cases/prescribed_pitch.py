@@ -29,7 +29,7 @@ from validation.hard_cases.setups import (
 
 DURATION = 0.5
 NOISE = 1e-6
-PERIOD = 1e-3
+SAMPLE_PERIOD = 1e-3
 AMPLITUDE, RATE = 0.02, 12.0
 """Pitch 0.02 sin(12 t + 1) rad: its second derivative does not vanish at the start, on purpose."""
 
@@ -39,7 +39,7 @@ def angle(t: np.ndarray) -> np.ndarray:
     return AMPLITUDE * np.sin(RATE * t + 1.0)
 
 
-def scene(sample_period: float = PERIOD, noise: float = 0.0) -> Assembly:
+def scene(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> Assembly:
     """The vehicle under its weight with a prescribed pitch, sampled every ``sample_period`` (s), with noise (rad) on
     the samples.
     """
@@ -57,9 +57,9 @@ def _weight_forces() -> Sampled:
 def _settled_state() -> np.ndarray:
     """State in which the fast suspension modes have decayed, so that only multipliers are compared."""
     base = vehicle()
-    samples = angle(PERIOD * np.arange(-500, 2))
-    unsettled = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, PERIOD))
-    return tight_solution(unsettled, PERIOD, DURATION).states[-1]
+    samples = angle(SAMPLE_PERIOD * np.arange(-500, 2))
+    unsettled = setups.guided_vehicle(base, _weight_forces(), smooth_pitch(samples, SAMPLE_PERIOD))
+    return tight_solution(unsettled, SAMPLE_PERIOD, DURATION).states[-1]
 
 
 def _settled_assembly(base_assembly: Assembly) -> Assembly:
@@ -68,12 +68,12 @@ def _settled_assembly(base_assembly: Assembly) -> Assembly:
 
 
 @cache
-def solution(sample_period: float = PERIOD, noise: float = 0.0) -> Trajectory:
+def solution(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> Trajectory:
     """Solution in which the pitch is eliminated, by order 8 at a tolerance of 1e-12, with rows every 1 ms."""
-    return tight_solution(scene(sample_period, noise), PERIOD, DURATION)
+    return tight_solution(scene(sample_period, noise), SAMPLE_PERIOD, DURATION)
 
 
-def truth(sample_period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
+def truth(sample_period: float = SAMPLE_PERIOD, noise: float = 0.0) -> np.ndarray:
     """True enforced moment (n,) in N m, from that solution."""
     moment = solution(sample_period, noise).moment
     assert moment is not None
@@ -184,16 +184,18 @@ def noisy_fine(engine: str, folder: Path) -> float:
 
 def _noisy_moment(engine: str, step: float) -> float:
     path = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED_INTEGRATORS[engine])
-    return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
+    return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / SAMPLE_PERIOD**2)
 
 
 def noisy_naive(folder: Path) -> str:
     """Without the remedy: Exudyn's default on noisy samples that are interpolated linearly."""
     base = vehicle()
-    samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
-    assembly = setups.guided_vehicle(_settled_assembly(base), _weight_forces(), StraightLinePitch(samples, PERIOD))
+    samples = angle(SAMPLE_PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
+    assembly = setups.guided_vehicle(
+        _settled_assembly(base), _weight_forces(), StraightLinePitch(samples, SAMPLE_PERIOD)
+    )
     path = as_it_comes(assembly, 1e-3)
-    expected = base.parameters.I * NOISE * np.sqrt(6) / PERIOD**2
+    expected = base.parameters.I * NOISE * np.sqrt(6) / SAMPLE_PERIOD**2
     return (
         f"Exudyn's default on straight lines: {moment_error(path, truth()) / 1e3:.0f} kN m, "
         f"finite differences would give {expected / 1e3:.1f}"
@@ -243,7 +245,7 @@ def refined_naive(folder: Path) -> str:
     """Without the remedy: Exudyn with noise-free samples that are interpolated linearly."""
     errors = []
     for step in (1e-3, 5e-4):
-        pitch = StraightLinePitch(angle(PERIOD * np.arange(501)), PERIOD)
+        pitch = StraightLinePitch(angle(SAMPLE_PERIOD * np.arange(501)), SAMPLE_PERIOD)
         assembly = setups.guided_vehicle(_settled_assembly(vehicle()), _weight_forces(), pitch)
         errors.append(moment_error(as_it_comes(assembly, step), truth()))
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"

@@ -36,7 +36,7 @@ from validation.hard_cases.setups import driven_by_forces, largest_magnitude, se
 NORMAL_LIMIT = 3.29
 """Standard errors that a normal value exceeds once in a thousand."""
 CORNER, Q, SPEED = 0.3, 1e-4, 31.0
-WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
+WALK, PATHS, SAMPLES, SAMPLING_RATE = 0.5, 600, 100, 50.0
 """Angle random walk (rad/sqrt(s)), paths, samples of each and their rate (Hz): E[tr E] falls from 3 to 1.8."""
 
 
@@ -137,21 +137,21 @@ def attitude(implementation: str, folder: Path) -> float:
     """Error of the mean trace of a noisy gyro's attitude error on a rotating body, against 3 exp(-s^2 t), in standard
     errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
-    start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
-    attitudes = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
-    true = measured_attitude(rates, 1.0 / RATE, np.zeros(3), start, range(1))[-1]
+    start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * SAMPLING_RATE**0.5)
+    attitudes = measured_attitude(rates, 1.0 / SAMPLING_RATE, deviation, start, range(PATHS), seed=5)[-1]
+    true = measured_attitude(rates, 1.0 / SAMPLING_RATE, np.zeros(3), start, range(1))[-1]
     traces = np.trace(rotation_matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
-    wanted = mean_trace(random_walk(deviation[0], RATE), SAMPLES / RATE)
+    wanted = mean_trace(random_walk(deviation[0], SAMPLING_RATE), SAMPLES / SAMPLING_RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
 def attitude_naive(folder: Path) -> str:
     """Without the remedy: norm of a quaternion that is integrated by explicit Euler."""
-    turns = WALK / RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
+    turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
     return (
         f"explicit Euler's quaternion has a mean square of {float((q**2).sum(axis=-1).mean()):.3f} "
-        f"({euler_mean_square(WALK, 3, 1.0 / RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
+        f"({euler_mean_square(WALK, 3, 1.0 / SAMPLING_RATE, SAMPLES):.3f} by its law): its matrix is no rotation"
     )
 
 

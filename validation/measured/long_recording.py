@@ -20,7 +20,7 @@ from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.common.peak_memory import peak_memory
 from validation.spatial.cars import r19
 
-PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
+SAMPLE_PERIOD, SEAM_SAMPLES, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""
 SENSOR_PLACES = {
     "acc fl": (1.2, 0.6, 0.6),
@@ -53,7 +53,7 @@ def sample_blocks(seconds: float, pattern_seconds: float = 20.0) -> Iterator[np.
     """Samples (n, 60) of a recording of a length (s), one block after the other."""
     signals, pattern = repeated_pattern(pattern_seconds)
     deviation = np.array([NOISE[signal.quantity] for signal in signals])
-    length, count = len(pattern) - SEAM_SAMPLES, round(seconds / PERIOD) + 1
+    length, count = len(pattern) - SEAM_SAMPLES, round(seconds / SAMPLE_PERIOD) + 1
     fade = np.linspace(0.0, 1.0, SEAM_SAMPLES, endpoint=False)[:, None]
     once = pattern[:length].copy()
     once[:SEAM_SAMPLES] = fade * pattern[:SEAM_SAMPLES] + (1 - fade) * pattern[length:]
@@ -69,11 +69,11 @@ def long_recording(seconds: float, path: Path, pattern_seconds: float = 20.0) ->
     """The long recording as an object, with no files read or mapped. Its samples are at ``path``, and are made if they
     are missing."""
     signals, _ = repeated_pattern(pattern_seconds)
-    columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
+    columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / SAMPLE_PERIOD) + 1)
     for values in sample_blocks(seconds, pattern_seconds) if columns.done == 0 else ():
         columns.write(columns.done, values)
     assert columns.done == columns.count
-    return Recording(signals, columns, PERIOD)
+    return Recording(signals, columns, SAMPLE_PERIOD)
 
 
 def recorded_sections() -> Sections:

@@ -39,7 +39,7 @@ def samples(path: Path) -> np.ndarray:
     read_car = car.read(path)
     with np.load(path) as data:
         begin, end = (side([data["gyro_t"][i], data["frame_t"][i]]) for side, i in ((max, 0), (min, -1)))
-        clock = np.arange(begin, end, car.PERIOD)
+        clock = np.arange(begin, end, car.SAMPLE_PERIOD)
         felt = np.column_stack([np.interp(clock, data["acc_t"], column) for column in data["acc"].T])
         frame_origin = data["frame_p"].mean(axis=0)
     upward = (
@@ -64,7 +64,7 @@ def recording(values: np.ndarray, path: Path) -> Recording:
         Signal(name, "", name, quantity, "body", component, "body", 1, "", 1.0)
         for name, quantity, component in CHANNELS
     )
-    return Recording(signals, columns, car.PERIOD)
+    return Recording(signals, columns, car.SAMPLE_PERIOD)
 
 
 def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:

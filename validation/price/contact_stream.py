@@ -20,7 +20,7 @@ from models.systems.contact.scene import Method
 from validation.common.peak_memory import peak_memory
 
 ROWS = (100_000, 1_000_000)
-PERIOD = 1000
+REPEATED_ROWS = 1000
 """Rows after which a table repeats itself."""
 HEADER = "a [m],b [m],load [N],friction [-],xi_x [-],xi_y [-],spin [1/m]\n"
 
@@ -34,11 +34,11 @@ class ProcessCost(NamedTuple):
 
 def write(path: Path, rows: int) -> None:
     """Write a table of creepages from rolling to sliding; rows : a multiple of PERIOD."""
-    lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(PERIOD))
+    lines = (f"5e-3,4e-3,{8e4 + i},0.3,{1e-5 * i:.6g},1e-4,{1e-3 * i:.4g}\n" for i in range(REPEATED_ROWS))
     text = "".join(lines)
     with path.open("w") as file:
         file.write(HEADER)
-        file.writelines(text for _ in range(rows // PERIOD))
+        file.writelines(text for _ in range(rows // REPEATED_ROWS))
 
 
 def answered(folder: Path, rows: int) -> ProcessCost:

@@ -42,7 +42,7 @@ from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre, Ve
 from models.vehicles.vehicle_file import load_vehicle
 
 SEED, STEP, STEPS = 43, 1e-3, 200
-UP: Vector = (0.0, 0.0, 1.0)
+UPWARD: Vector = (0.0, 0.0, 1.0)
 Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -101,7 +101,14 @@ def _vehicle_in_space(plane_vehicle: Vehicle) -> SpatialVehicle:
     struts_between_bodies = [strut for strut in plane_vehicle.struts if strut.lower.body is not None]
     springs = tuple(
         SpringDamper(
-            s.name, str(s.lower.body), s.upper.body, (s.lower.x, 0, 0), (s.upper.x, 0, 0), UP, s.stiffness, s.damping
+            s.name,
+            str(s.lower.body),
+            s.upper.body,
+            (s.lower.x, 0, 0),
+            (s.upper.x, 0, 0),
+            UPWARD,
+            s.stiffness,
+            s.damping,
         )
         for s in struts_between_bodies
     )
@@ -125,7 +132,7 @@ def _force_table(tree: SpatialVehicle, vehicle: SpatialVehicle) -> np.ndarray:
         _spring_element(s.name, s.first_body, str(s.second_body), s, s.first_point, s.second_point, s.axis)
         for s in vehicle.springs
     ]
-    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UP) for t in vehicle.tyres]
+    tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in vehicle.tyres]
     cut_vehicle = CutVehicle(vehicle.bodies[0].name, tree, tree, (*springs, *tyres), np.zeros(0))
     numbers = table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = parts(numbers)[3], -1.0

@@ -27,7 +27,7 @@ from models.systems.ride.of_scene import goes_in_time
 
 MOST_PRICED_STEPS = 960
 """Of every run, so many are priced."""
-ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
+TIMING_ROUNDS, LEAST_ROUNDS, LONG_ROUNDS_SECONDS = 7, 3, 10.0
 """Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
 SEED = 11
 
@@ -139,7 +139,7 @@ def _microseconds_by_turn(runs: dict[str, Callable[[], RunQuantities]]) -> dict[
     """CPU microseconds of a step (turns,) for every run; the runs take turns in random order."""
     micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, start_time = np.random.default_rng(SEED), list(runs), time.process_time()
-    for i in range(ROUNDS):
+    for i in range(TIMING_ROUNDS):
         if i >= LEAST_ROUNDS and (time.process_time() - start_time) * (i + 1) > i * LONG_ROUNDS_SECONDS:
             break
         for j in order.permutation(len(names)):

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price.effects import ROUNDS, SEED, EffectPrice, PriceList, QuantityChange, median_and_deviation
+from models.advice.price.effects import (
+    SEED,
+    TIMING_ROUNDS,
+    EffectPrice,
+    PriceList,
+    QuantityChange,
+    median_and_deviation,
+)
 from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import FullScene, Reduced
 from models.advice.ride_choice.screen import exact_variances
@@ -86,8 +93,8 @@ def _counts_of_scene(system: Reduced) -> dict[str, int]:
 
 def _microseconds_by_turn(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (ROUNDS,) for every system; the systems take turns in random order."""
-    micros, order = {name: np.empty(ROUNDS) for name in systems}, np.random.default_rng(SEED)
-    for i in range(ROUNDS):
+    micros, order = {name: np.empty(TIMING_ROUNDS) for name in systems}, np.random.default_rng(SEED)
+    for i in range(TIMING_ROUNDS):
         for j in order.permutation(len(systems)):
             name, system = list(systems.items())[j]
             micros[name][i] = _step_microseconds(system.system.A[: system.states, : system.states])

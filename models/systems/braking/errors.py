@@ -32,7 +32,7 @@ from models.systems.braking.stop_report import Stop
 LARGEST_ORDER, CAREFUL_ORDER = 1.5, 1.0
 """Largest that is taken for the order of the steps, two between the kinks of brakes and tables of friction, and what is
 taken where two runs cannot tell."""
-WINDOW, FINE_WINDOW = 0.4, 0.3
+COARSE_WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
 LONGEST_REPEAT = 1.1
 """Times of the stop, until which another run may take to stand."""
@@ -170,7 +170,9 @@ def _finer_runs(path: BrakingPath, steps: int, rerun: Callable[[int, float], Bra
     if steps == 1:
         return [rerun(2, FINE_WINDOW * end_time)]
     first = rerun(steps // 2, LONGEST_REPEAT * end_time if path.ended_at_rest else end_time)
-    return [first, rerun(steps // 4, WINDOW * end_time)] if steps >= 4 and same_commands(path, first) else [first]
+    return (
+        [first, rerun(steps // 4, COARSE_WINDOW * end_time)] if steps >= 4 and same_commands(path, first) else [first]
+    )
 
 
 def _by_fewer(path: BrakingPath, steps: int, finer_runs: list[BrakingPath], step: float) -> dict[str, Estimate]:

@@ -28,7 +28,7 @@ LARGEST_YAW_RATE = 20.0
 REPORT_NAMES = ("load front", "side force front", "slip angle front", "load rear", "side force rear", "slip angle rear")
 REPORT_COLUMNS = (1, 3, 5, 2, 4, 6)
 REPORT_UNITS = ("N", "N", "rad") * 2
-TOLD, ORDER = ("yaw rate", "lateral acceleration", "side slip"), 2.0
+ESTIMATED_CHANNELS, HEUN_ORDER = ("yaw rate", "lateral acceleration", "side slip"), 2.0
 """Channels whose error is told, and the order of Heun's method."""
 
 
@@ -77,7 +77,7 @@ def _with_step_error(
     estimates = {}
     for name, finer in quarter.items():
         fine, values = half[name], np.asarray(run[name])
-        order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), ORDER)
+        order = observed_order(root_mean_square(finer - fine), root_mean_square(fine - values), HEUN_ORDER)
         error = root_mean_square(fine - values) / (1.0 - 0.5**order)
         estimates[name] = estimate_rescaled(
             Estimate(error, run.data[name].attrs["units"], 0.0, order, period), size_of(values), period
@@ -97,7 +97,7 @@ def _sensed_in_parts(
     )
     motion, table = motion_of(scene, np.ascontiguousarray(between), sample_period / parts_per_sample)
     sensed = sensor_channels(scene.sensors, inputs_of_samples, motion[::parts_per_sample], table[::parts_per_sample, 0])
-    return {name: np.asarray(sensed[name].values) for name in TOLD}
+    return {name: np.asarray(sensed[name].values) for name in ESTIMATED_CHANNELS}
 
 
 def equation_inputs(drive: MeasuredDrive, scene: SingleTrackScene) -> np.ndarray:

@@ -10,12 +10,12 @@ import numpy as np
 from models.measured.formats.mdf4 import suppressed_output
 from validation.measured.measured_files.csv import BACK
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
     MANY_CHANNELS,
     REPEATED_NAME,
-    TIMES,
+    SAMPLE_COUNT,
+    SAMPLE_TIMES,
     TWO_RATES,
     Files,
     Make,
@@ -41,7 +41,7 @@ def signals(
     version: str = "4.10",
     compression: Literal[0, 2] = 0,
     start_date: datetime | None = None,
-    times: np.ndarray = TIMES,
+    times: np.ndarray = SAMPLE_TIMES,
     families: tuple[str, ...] = (),
 ) -> Make:
     """Make a file of groups, name -> samples or keywords of asammdf's Signal; ``families`` are their names."""
@@ -124,16 +124,16 @@ def headed(byte_offset: int, new_bytes: bytes, length: int | None = None) -> Mak
     return altered(MDF4, lambda data: patched(data, byte_offset, new_bytes)[:length])
 
 
-def only(name: str, values: np.ndarray, times: np.ndarray = TIMES) -> Truth:
+def only(name: str, values: np.ndarray, times: np.ndarray = SAMPLE_TIMES) -> Truth:
     """Truth of one channel."""
     return {name: (times, values)}
 
 
-WHOLE_NUMBERS = np.arange(COUNT, dtype="i2")
-INVALID = np.arange(COUNT) % 11 == 3
+WHOLE_NUMBERS = np.arange(SAMPLE_COUNT, dtype="i2")
+INVALID = np.arange(SAMPLE_COUNT) % 11 == 3
 LOST_SAMPLES = np.where(FX < -50.0, np.nan, FZ)
 
-STOPPED = np.where(np.arange(COUNT) == 9, np.nan, TIMES)
+STOPPED = np.where(np.arange(SAMPLE_COUNT) == 9, np.nan, SAMPLE_TIMES)
 
 REFUSED: Files = {
     "MDF 4 cut in its header": ("the first block is incomplete", headed(0, b"MDF", 100), "cut off"),
@@ -175,7 +175,7 @@ REFUSED: Files = {
     ),
     "MDF 4 of one record more than there is": (
         "the last one is made up",
-        changed(b"##CG", 8, struct.pack("<Q", COUNT + 1)),
+        changed(b"##CG", 8, struct.pack("<Q", SAMPLE_COUNT + 1)),
         "records",
     ),
     "MDF 4 of no records": ("a recording that never began", changed(b"##CG", 8, struct.pack("<Q", 0)), "no samples"),
@@ -197,12 +197,12 @@ REFUSED: Files = {
 NAMED: Files = {
     "MDF 4 of fewer records than there are": (
         "counters of a recorder that stopped early",
-        changed(b"##CG", 8, struct.pack("<Q", COUNT - 5)),
+        changed(b"##CG", 8, struct.pack("<Q", SAMPLE_COUNT - 5)),
         "announced and read",
     ),
     "MDF 4 with texts": (
         "remarks of the driver in a channel",
-        signals({"Fz": FZ, "remark": {"samples": np.array([b"abc"] * COUNT), "encoding": "utf-8"}}),
+        signals({"Fz": FZ, "remark": {"samples": np.array([b"abc"] * SAMPLE_COUNT), "encoding": "utf-8"}}),
         "no numbers: 'remark'",
         only("Fz", FZ),
     ),
@@ -265,7 +265,7 @@ FILES = (
             signals({"Fz": FZ}, {"Fz": FX}, version=version, families=("WFT VL", "WFT HR")),
             "named",
             "'WFT HR/Fz'",
-            {"WFT VL/Fz": (TIMES, FZ), "WFT HR/Fz": (TIMES, FX)},
+            {"WFT VL/Fz": (SAMPLE_TIMES, FZ), "WFT HR/Fz": (SAMPLE_TIMES, FX)},
         )
         for version in ("4.10", "3.30")
     ),

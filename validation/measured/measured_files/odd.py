@@ -23,17 +23,17 @@ Make = Callable[[Path], Path]
 Files = dict[str, tuple[Any, ...]]
 """By name: what makes a file hard, how it is made, a phrase of what is said of it, and its truth unless the usual one;
 nothing is said of those that are read right."""
-COUNT, PERIOD = 40, 0.01
+SAMPLE_COUNT, SAMPLE_PERIOD = 40, 0.01
 """Samples of the usual file, s between them."""
-TIMES = PERIOD * np.arange(COUNT)
-FZ, FX = 1000.0 + 2.0**-6 * np.arange(COUNT), -2.5 * np.arange(COUNT)
+SAMPLE_TIMES = SAMPLE_PERIOD * np.arange(SAMPLE_COUNT)
+FZ, FX = 1000.0 + 2.0**-6 * np.arange(SAMPLE_COUNT), -2.5 * np.arange(SAMPLE_COUNT)
 """Values with a few bits, which every format keeps exactly."""
 SLOW_PERIOD = 0.05
 """s between samples of a channel of another rate."""
-TWO_RATES = {"Fz": (TIMES, FZ), "Fx": (SLOW_PERIOD * np.arange(COUNT), FX)}
-MANY_CHANNELS = {f"c{i}": (TIMES, FZ + i) for i in range(300)}
+TWO_RATES = {"Fz": (SAMPLE_TIMES, FZ), "Fx": (SLOW_PERIOD * np.arange(SAMPLE_COUNT), FX)}
+MANY_CHANNELS = {f"c{i}": (SAMPLE_TIMES, FZ + i) for i in range(300)}
 """Truth of files of two rates, and of 300 channels."""
-REPEATED_NAME = {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)}
+REPEATED_NAME = {"Fz (1)": (SAMPLE_TIMES, FZ), "Fz (2)": (SAMPLE_TIMES, FX)}
 """Truth of a file that has the same name twice."""
 TOLERANCE = 1e-12
 """Of times and values alike: CSV writes times with 15 digits, the values are kept to the last bit."""
@@ -43,7 +43,7 @@ MEMORY, SECONDS = 5e7, 10.0
 
 def usual(**changed: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Expected times and values of the two channels of the usual file, or other values under a channel's name."""
-    return {name: (TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
+    return {name: (SAMPLE_TIMES, changed.get(name, values)) for name, values in (("Fz", FZ), ("Fx", FX))}
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def _largest_difference(
 def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
     """Write channels (by default those of the usual file) in the format that the extension of ``path`` names."""
     table = np.column_stack((FZ, FX)) if values is None else values
-    group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), PERIOD, len(table), [table])
+    group = ChannelGroup(names, ("N",) * len(names), ("",) * len(names), SAMPLE_PERIOD, len(table), [table])
     return write(path, [group])
 
 
@@ -210,11 +210,12 @@ def patched(raw_bytes: bytes, byte_offset: int, new_bytes: bytes) -> bytes:
 
 def two_rates(file_extension: str) -> Make:
     """Make a file of two groups of different rates."""
-    clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
+    clocks = (("Fz", SAMPLE_PERIOD, FZ), ("Fx", SLOW_PERIOD, FX))
 
     def make(folder: Path) -> Path:
         groups = [
-            ChannelGroup((name,), ("N",), ("",), period, COUNT, [samples[:, None]]) for name, period, samples in clocks
+            ChannelGroup((name,), ("N",), ("",), period, SAMPLE_COUNT, [samples[:, None]])
+            for name, period, samples in clocks
         ]
         return write(folder / f"odd{file_extension}", groups)
 
@@ -240,10 +241,12 @@ class CutSweep:
     def silent(self, folder: Path) -> int:
         """Number of cuts after which wrong values are read, or the cut is not reported."""
         folder.mkdir(parents=True, exist_ok=True)
-        count = 7000 if self.extension == ".rsp" else COUNT  # three groups of RPC III and a half
-        table = np.column_stack((FZ, FX)) if count == COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
+        count = 7000 if self.extension == ".rsp" else SAMPLE_COUNT  # three groups of RPC III and a half
+        table = np.column_stack((FZ, FX)) if count == SAMPLE_COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
         path = written(folder / f"cut{self.extension}", values=table)
-        truth = {name: (PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)}
+        truth = {
+            name: (SAMPLE_PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)
+        }
         data = path.read_bytes()
         cut_lengths = (
             range(len(data)) if self.cuts == 0 else np.linspace(0, len(data) - 1, self.cuts).astype(int).tolist()

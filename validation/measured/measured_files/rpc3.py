@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from validation.measured.measured_files.odd import (
-    COUNT,
     FX,
     FZ,
-    PERIOD,
     REPEATED_NAME,
-    TIMES,
+    SAMPLE_COUNT,
+    SAMPLE_PERIOD,
+    SAMPLE_TIMES,
     Files,
     Make,
     altered,
@@ -57,7 +57,7 @@ def _values(raw_bytes: bytes) -> dict[str, Any]:
     return dict(texts)
 
 
-DIGITS = np.pad(np.tile(np.arange(COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POINTS - COUNT)))
+DIGITS = np.pad(np.tile(np.arange(SAMPLE_COUNT, dtype="<i2"), (2, 1)), ((0, 0), (0, POINTS - SAMPLE_COUNT)))
 """Samples of 16 bits: 2^-6 per digit and an offset that fits, -2.5 per digit."""
 SCALED = with_parameters(DATA_TYPE="SHORT_INTEGER", SCALE_CHAN_1="0.015625", SCALE_CHAN_2="-2.5")
 
@@ -70,11 +70,11 @@ def sample(sample_value: float) -> Make:
 
 def padded(sample_count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Expected values, with the last one repeated up to ``sample_count`` samples."""
-    sample_times, padding = PERIOD * np.arange(sample_count), (0, sample_count - COUNT)
+    sample_times, padding = SAMPLE_PERIOD * np.arange(sample_count), (0, sample_count - SAMPLE_COUNT)
     return {name: (sample_times, np.pad(values, padding, mode="edge")) for name, (_, values) in usual().items()}
 
 
-WHOLE_NUMBERS = {"Fz": (TIMES, 2.0**-6 * np.arange(COUNT)), "Fx": (TIMES, FX)}
+WHOLE_NUMBERS = {"Fz": (SAMPLE_TIMES, 2.0**-6 * np.arange(SAMPLE_COUNT)), "Fx": (SAMPLE_TIMES, FX)}
 REFUSED: Files = {
     "RPC III cut in its header": (
         "the parameters are incomplete",
@@ -161,7 +161,7 @@ NAMED: Files = {
         "nothing to map",
         with_parameters(DESC_CHAN_2=None),
         "no channel 2",
-        {"Fz": (TIMES, FZ), "channel 2": (TIMES, FX)},
+        {"Fz": (SAMPLE_TIMES, FZ), "channel 2": (SAMPLE_TIMES, FX)},
     ),
     "RPC III with a date without zone": (
         "eight o'clock where",
@@ -183,13 +183,13 @@ RIGHT: Files = {
     "RPC III with umlauts": (
         "bytes beyond ASCII",
         with_parameters(DESC_CHAN_1="Kraft Räder", DESC_CHAN_2="Größe"),
-        {"Kraft Räder": (TIMES, FZ), "Größe": (TIMES, FX)},
+        {"Kraft Räder": (SAMPLE_TIMES, FZ), "Größe": (SAMPLE_TIMES, FX)},
     ),
     "RPC III without units": ("kN or N, nobody knows", with_parameters(UNITS_CHAN_1=None)),
     "RPC III with NaN": (
         "nothing was measured at one sample",
         sample(np.nan),
-        usual(Fz=np.where(np.arange(COUNT) == 5, np.nan, FZ)),
+        usual(Fz=np.where(np.arange(SAMPLE_COUNT) == 5, np.nan, FZ)),
     ),
 }
 GREEDY = ("RPC III of a huge number of frames", "RPC III of a huge number of channels", "RPC III of a huge header")

@@ -42,7 +42,7 @@ DEFAULT_METHODS = {(OWN_METHOD, BrakedVehicle.substeps): "twinrig", (LITERAL, 1)
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 ORDERS = {EULER: 1, LITERAL: 1}
 FULL_STEPS = {OWN_METHOD: SUBSTEPS, EULER: SUBSTEPS, RK4: SUBSTEPS, LITERAL: SUBSTEPS}
-QUICK = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
+QUICK_SUBSTEPS = {OWN_METHOD: (1, 2, 4, 8, 16), EULER: (8, 64), RK4: (8, 64), LITERAL: (1, 16, 64, 256)}
 """The named share of FULL_STEPS that the quick report takes, from half the speed; the paper's own single step is far
 from where its order shows."""
 SOLVERS = {True: (("DOP853", 1e-10), ("LSODA", 1e-10)), False: (("DOP853", 1e-12), ("LSODA", 1e-11))}
@@ -121,7 +121,7 @@ class BrakingStop:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL_STEPS, or its named share QUICK."""
-        chosen = QUICK if quick else FULL_STEPS
+        chosen = QUICK_SUBSTEPS if quick else FULL_STEPS
         return tuple(
             self.setting("reference", method, SAMPLE / n)
             for method, substep_counts in chosen.items()

@@ -33,7 +33,7 @@ GOLDEN = 0.6180339887498949
 """Phases of the sines are its multiples: a formula that nobody has to draw."""
 RISE_PLACE, RISE_LENGTH = 3.0, 0.5
 """Where the road has half its height (m from the origin), and over what length it rises."""
-GRID = 20e-3
+COMPARED_GRID = 20e-3
 """Spacing (s) of the instants that are compared, which every step meets."""
 GRAVITY = 9.81
 _LONG_STEPS = milliseconds(20, 10, 20 / 3, 5, 4, 2)
@@ -52,7 +52,7 @@ FULL_STEPS: Curves = {
 }
 """Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
 to be refused: the road is read at half steps."""
-KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
+OUTPUT_KINDS = {"wheel load": "tyre force", "acceleration": "acceleration"}
 """Kinds of the vehicle's outputs that are read."""
 REFERENCES = (("DOP853", 1e-11, "equations by hand"), ("LSODA", 1e-12, "MuJoCo's accelerations"))
 """Solvers with their relative tolerances and what they solve: a Runge-Kutta method and a multistep one."""
@@ -94,7 +94,7 @@ class FreeVehicle:
         )
         self.units = {"wheel load": "N", "acceleration": "m/s^2"}
         self.vehicle = replace(load_vehicle("r19_free"), gravity=GRAVITY)
-        self.instants = GRID * np.arange(round(DURATION / GRID) + 1)
+        self.instants = COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1)
         self.reference = " and ".join(f"{purpose} by {method} at {tol:g}" for method, tol, purpose in REFERENCES)
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
@@ -140,7 +140,7 @@ class FreeVehicle:
         motion = np.column_stack([accelerations, states[:, n:], states[:, :n], road])
         return {
             name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T
-            for name, kind in KINDS.items()
+            for name, kind in OUTPUT_KINDS.items()
         }
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -152,7 +152,11 @@ class FreeVehicle:
         on steps; or a tolerance.
         """
         known = CATALOGUE[engine][method.split()[0]]
-        step = step_or_tolerance if known.adaptive else GRID / np.ceil(GRID / step_or_tolerance * (1 - 1e-9))
+        step = (
+            step_or_tolerance
+            if known.adaptive
+            else COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
+        )
         return setting(engine, method, float(step))
 
     def build(self, setting: Setting) -> FreeVehicleSolver:
@@ -165,7 +169,7 @@ class FreeVehicle:
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of any wheel load and of any acceleration at the compared instants."""
-        stride = round(GRID / (solution.times[1] - solution.times[0]))
+        stride = round(COMPARED_GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::stride]
         return largest_differences(self.read(states, self.instants), self._true)
 

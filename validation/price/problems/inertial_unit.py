@@ -23,7 +23,7 @@ from validation.price.problems import Curves, curves_of_methods, settings_of_cur
 from validation.price.problems.road_excited import DEFAULTS, STAGES
 from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
 
-DURATION, GRID = 600.0, 1.0
+DURATION, COMPARED_GRID = 600.0, 1.0
 """s, of the run and between the instants that are compared, which every step meets."""
 SINES = {
     "roll": ((0.03, 1.1, 0.4), (0.015, 7.3, 1.9)),
@@ -120,7 +120,7 @@ class AttitudeSolver:
     def run(self) -> Attitudes:
         """Attitudes at the compared instants; Refused or RunFailed from the engine pass through."""
         engine, method, period = self.setting.engine, self.setting.method, self.setting.value
-        count, stride, start = round(DURATION / period), round(GRID / period), attitude(np.zeros(1))[0]
+        count, stride, start = round(DURATION / period), round(COMPARED_GRID / period), attitude(np.zeros(1))[0]
         if engine != "reference":
             return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, stride, start, gyro)
         attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
@@ -144,8 +144,8 @@ class InertialUnit:
         )
         self.units = {"attitude": "rad"}
         self.reference = f"closed form, and a Magnus method of order six at {1e3 * FINE_STEP:g} ms"
-        self.true = attitude(GRID * np.arange(round(DURATION / GRID) + 1))
-        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(GRID / FINE_STEP)], self.true)}
+        self.true = attitude(COMPARED_GRID * np.arange(round(DURATION / COMPARED_GRID) + 1))
+        self.uncertainty = {"attitude": apart(magnus(FINE_STEP)[:: round(COMPARED_GRID / FINE_STEP)], self.true)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL_RATES, or its named share QUICK."""
@@ -157,7 +157,7 @@ class InertialUnit:
         """A setting: curve, and the longest step (s) up to ``step_or_tolerance`` for which all compared instants fall
         on steps.
         """
-        step = GRID / np.ceil(GRID / step_or_tolerance * (1 - 1e-9))
+        step = COMPARED_GRID / np.ceil(COMPARED_GRID / step_or_tolerance * (1 - 1e-9))
         order = RULES[method][1] if engine == "reference" else 1 if method in FIRST_ORDER_METHODS else 2
         stages = 1 if engine == "reference" else STAGES.get(method, 0)
         return Setting(

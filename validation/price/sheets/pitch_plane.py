@@ -8,7 +8,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.road.study import FADE_IN_LENGTH, study_road
 from validation.price.problems import force_excited, road_excited
-from validation.price.problems.force_excited import DURATION, FINE_STEP, PERIOD, ForceExcited
+from validation.price.problems.force_excited import DURATION, FINE_STEP, SAMPLE_PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
@@ -67,8 +67,8 @@ def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
     signal, guided = problem.assembly.input, bool(problem.assembly.guided)
     assert signal is not None
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
-    sample_times = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
-    inputs = signal.sample(0.0, PERIOD, len(sample_times))[:, : len(heads) - 1]
+    sample_times = SAMPLE_PERIOD * np.arange(round(DURATION / SAMPLE_PERIOD) + 1)
+    inputs = signal.sample(0.0, SAMPLE_PERIOD, len(sample_times))[:, : len(heads) - 1]
     columns(folder, problem.key, heads, np.column_stack([sample_times, inputs]))
     return write_page(
         folder,
@@ -86,9 +86,9 @@ def ends(problem: ForceExcited) -> list[Value]:
     over the run."""
     runs = [
         build("reference", problem.assembly, settings).run()
-        for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", PERIOD, DURATION, 1e-12))
+        for settings in (Settings("RK4", FINE_STEP, DURATION), Settings("DOP853", SAMPLE_PERIOD, DURATION, 1e-12))
     ]
-    true, other_states = (run.states[:: (len(run.states) - 1) // round(DURATION / PERIOD)] for run in runs)
+    true, other_states = (run.states[:: (len(run.states) - 1) // round(DURATION / SAMPLE_PERIOD)] for run in runs)
     return _values(problem.key, DURATION, true[-1], np.abs(true - other_states).max(axis=0))
 
 

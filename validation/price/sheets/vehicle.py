@@ -66,7 +66,7 @@ def write(folder: Path) -> list[Value]:
     ]
     question = (
         "Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
-        f"every {1e3 * free_vehicle.GRID:g} ms."
+        f"every {1e3 * free_vehicle.COMPARED_GRID:g} ms."
     )
     return write_page(
         folder,
